@@ -1,0 +1,58 @@
+"""Discrete elastic rods for rings that fold by twisting.
+
+    scene = der.Scene(der.circle(), der.rectangular_section(h_over_t=4))
+    path = der.fold(scene)   # arrays gamma, moment, energy, index; points; at_pi; mode
+
+Names are imported when they are first used, so that ``import der`` costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from der.folding import Interrupted, NotConverged, fold
+    from der.record import Path, Point
+    from der.ring import Ring, circle, ellipse, profile, rectangle, triangle
+    from der.scene import Scene
+    from der.sections import Scale, Section, rectangular_section, section
+
+__all__ = [
+    "Interrupted",
+    "NotConverged",
+    "Path",
+    "Point",
+    "Ring",
+    "Scale",
+    "Scene",
+    "Section",
+    "circle",
+    "ellipse",
+    "fold",
+    "profile",
+    "rectangle",
+    "rectangular_section",
+    "section",
+    "triangle",
+]
+
+_HOME = {
+    "folding": ("fold", "Interrupted", "NotConverged"),
+    "record": ("Path", "Point"),
+    "ring": ("Ring", "circle", "ellipse", "profile", "rectangle", "triangle"),
+    "scene": ("Scene",),
+    "sections": ("Scale", "Section", "rectangular_section", "section"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    # fold and section are functions and submodules of one name: the function is what users want
+    for module, names in _HOME.items():
+        if name in names:
+            value = getattr(import_module(f"der.{module}"), name)
+            globals()[name] = value
+            return value
+    raise AttributeError(f"module 'der' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

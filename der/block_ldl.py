@@ -1,0 +1,375 @@
+"""Block LDL^T of a symmetric block-tridiagonal matrix with a dense border: O(n), with inertia.
+
+        [ T  B ]   T: n diagonal blocks (b, b), and off[j] = T[j, j+1], (b, b) each
+    K = [      ]
+        [ B' 0 ]   B: m border columns
+
+Blocks are eliminated in order, with complete (Bunch-Parlett) pivoting inside each. That alone is
+not backward stable, since a pivot block can come close to singular while K does not. Such a pivot
+is *delayed*: delta > 0 is added to its diagonal entry u and taken out again by one more border
+column,
+
+    [ T + delta u u'   u       ]
+    [ u'               1/delta ]     the Schur complement over 1/delta is T,
+
+an exact identity that leaves the number of negative eigenvalues as it is; growth stays bounded,
+and the small, fully pivoted border settles the matter. The inertia of K is that of the pivots plus
+that of the border's Schur complement (Haynsworth).
+
+Two bands (the arms of a gripped ring) are one T with a zero block between them; what joins them,
+the grip distance, is a border column. A closed ring without grips holds one edge's frame, which
+takes out rigid rotations and cuts the cycle.
+
+SciPy has banded Cholesky and LU, but no symmetric-indefinite band solver that tells the inertia.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+MAX_DELAYED = 8
+
+_DELAY_BELOW = 1e-4  # relative size below which a pivot is delayed: growth stays under its inverse
+_BUNCH_PARLETT = 0.6403882032022076  # (1 + sqrt 17)/8, Bunch & Parlett 1971
+
+
+class Factors(NamedTuple):
+    """Factors of K. ``border`` holds B and the columns of delayed pivots, M = m + delayed."""
+
+    inverse: NDArray[np.float64]  # (n, b, b) inverses of the pivot blocks
+    lower: NDArray[np.float64]  # (n, b, b) subdiagonal blocks of L; lower[0] is not used
+    border: NDArray[np.float64]  # (n, b, M)
+    lifted: NDArray[np.float64]  # (n, b, M) T^-1 border
+    schur: NDArray[np.float64]  # (M, M) C - border' lifted
+    magnitude: NDArray[np.float64]  # (M,) size of the terms that make the diagonal of schur
+    negative: int  # negative pivots of T
+
+
+@njit(cache=True)
+def invert(A, delay_below, out_delayed):
+    """Replace the symmetric ``A`` (m, m) by -A^-1, by sweeps with complete pivoting.
+
+    Pivots are single entries or pairs (Bunch & Parlett), so an indefinite ``A`` is safe. When all
+    that is left is below ``delay_below``, the largest diagonal entry k left is raised to the size of
+    the matrix, and ``out_delayed[k]`` says by how much; with ``delay_below`` = 0 nothing is added.
+
+    Returns (number of negative pivots, smallest |pivot|); a zero pivot ends with (count, 0).
+    """
+    m = A.shape[0]
+    swept = np.zeros(m, dtype=np.bool_)
+    left = m
+    negative = 0
+    smallest = np.inf
+    while left > 0:
+        on, off, k, i2, j2 = -1.0, -1.0, 0, 0, 0
+        for i in range(m):
+            if swept[i]:
+                continue
+            if abs(A[i, i]) > on:
+                on, k = abs(A[i, i]), i
+            for j in range(i):
+                if not swept[j] and abs(A[i, j]) > off:
+                    off, i2, j2 = abs(A[i, j]), i, j
+        if max(on, off) <= delay_below:
+            if delay_below == 0.0:
+                return negative, 0.0
+            out_delayed[k] = delay_below / _DELAY_BELOW
+            A[k, k] += out_delayed[k]
+            on, off = abs(A[k, k]), 0.0
+        if on >= _BUNCH_PARLETT * off:
+            d = A[k, k]
+            negative += d < 0.0
+            smallest = min(smallest, abs(d))
+            for i in range(m):
+                if i != k:
+                    ratio = A[i, k] / d
+                    for j in range(i + 1):
+                        if j != k:
+                            A[i, j] -= ratio * A[j, k]
+                            A[j, i] = A[i, j]
+            for i in range(m):
+                if i != k:
+                    A[i, k] /= d
+                    A[k, i] = A[i, k]
+            A[k, k] = -1.0 / d
+            swept[k] = True
+            left -= 1
+        else:
+            a, c, d = A[i2, i2], A[i2, j2], A[j2, j2]
+            det = a * d - c * c  # negative, by the choice of the pair
+            negative += 1
+            smallest = min(smallest, np.sqrt(-det))
+            for i in range(m):
+                if i != i2 and i != j2:
+                    x = (d * A[i, i2] - c * A[i, j2]) / det
+                    y = (a * A[i, j2] - c * A[i, i2]) / det
+                    for j in range(i + 1):
+                        if j != i2 and j != j2:
+                            A[i, j] -= x * A[j, i2] + y * A[j, j2]
+                            A[j, i] = A[i, j]
+            for i in range(m):
+                if i != i2 and i != j2:
+                    x = (d * A[i, i2] - c * A[i, j2]) / det
+                    y = (a * A[i, j2] - c * A[i, i2]) / det
+                    A[i, i2] = x
+                    A[i2, i] = x
+                    A[i, j2] = y
+                    A[j2, i] = y
+            A[i2, i2], A[j2, j2] = -d / det, -a / det
+            A[i2, j2] = c / det
+            A[j2, i2] = A[i2, j2]
+            swept[i2] = True
+            swept[j2] = True
+            left -= 2
+    return negative, smallest
+
+
+@njit(cache=True)
+def factor(diag, off, border):
+    """Factor K; see `Factors`. ``negative`` is -1 where too many pivots had to be delayed.
+
+    Parameters
+    ----------
+    diag : (n, b, b) diagonal blocks, symmetric. off : (n - 1 or more, b, b) blocks T[j, j+1].
+    border : (n, b, m).
+    """
+    n, b, m = border.shape
+    inverse = np.empty((n, b, b))
+    lower = np.empty((n, b, b))
+    where = np.empty((MAX_DELAYED, 2), dtype=np.int64)
+    added = np.empty(MAX_DELAYED)
+    delayed = np.zeros(b)
+    pivot = np.empty((b, b))
+    count = 0
+    negative = 0
+    whole = max(np.max(np.abs(diag)), np.max(np.abs(off))) if n > 0 else 0.0
+    for j in range(n):
+        size = 1e-3 * whole  # a block may be zero by itself
+        for k in range(b):
+            for i in range(b):
+                pivot[k, i] = diag[j, k, i]
+                size = max(size, abs(pivot[k, i]))
+        if j > 0:
+            for k in range(b):
+                for i in range(b):
+                    s = 0.0
+                    for r in range(b):
+                        s += off[j - 1, r, k] * inverse[j - 1, r, i]
+                    lower[j, k, i] = s
+            for k in range(b):
+                for i in range(k + 1):
+                    s = pivot[k, i]
+                    for r in range(b):
+                        s -= lower[j, k, r] * off[j - 1, r, i]
+                    pivot[k, i] = s
+                    pivot[i, k] = s
+        minus, _ = invert(pivot, _DELAY_BELOW * size, delayed)
+        negative += minus
+        for k in range(b):
+            for i in range(b):
+                inverse[j, k, i] = -pivot[k, i]
+            if delayed[k] != 0.0:
+                if count < MAX_DELAYED:
+                    where[count, 0], where[count, 1], added[count] = j, k, delayed[k]
+                count += 1
+                delayed[k] = 0.0
+    if count > MAX_DELAYED:
+        count, negative = 0, -1
+
+    M = m + count
+    wide = np.zeros((n, b, M))
+    wide[:, :, :m] = border
+    for d in range(count):
+        wide[where[d, 0], where[d, 1], m + d] = 1.0
+    lifted = wide.copy()
+    solve_band(inverse, lower, lifted)
+    schur = np.zeros((M, M))
+    magnitude = np.zeros(M)
+    for d in range(count):
+        schur[m + d, m + d] = 1.0 / added[d]
+        magnitude[m + d] = 1.0 / added[d]
+    for j in range(n):
+        for k in range(b):
+            for p in range(M):
+                if wide[j, k, p] != 0.0:
+                    magnitude[p] += abs(wide[j, k, p] * lifted[j, k, p])
+                    for q in range(p + 1):
+                        schur[p, q] -= wide[j, k, p] * lifted[j, k, q]
+    for p in range(M):
+        for q in range(p):
+            schur[q, p] = schur[p, q]
+    return Factors(inverse, lower, wide, lifted, schur, magnitude, negative)
+
+
+@njit(cache=True)
+def solve_band(inverse, lower, x):
+    """Replace ``x`` (n, b, r), r right-hand sides, by (T + delayed)^-1 x."""
+    n, b, r = x.shape
+    y = np.empty((b, r))
+    for j in range(1, n):
+        for k in range(b):
+            for i in range(b):
+                for c in range(r):
+                    x[j, k, c] -= lower[j, k, i] * x[j - 1, i, c]
+    for j in range(n - 1, -1, -1):
+        for k in range(b):
+            for c in range(r):
+                y[k, c] = 0.0
+            for i in range(b):
+                for c in range(r):
+                    y[k, c] += inverse[j, k, i] * x[j, i, c]
+            if j < n - 1:
+                for i in range(b):
+                    for c in range(r):
+                        y[k, c] -= lower[j + 1, i, k] * x[j + 1, i, c]
+        for k in range(b):
+            for c in range(r):
+                x[j, k, c] = y[k, c]
+
+
+@njit(cache=True)
+def inertia(factors):
+    """Number of negative eigenvalues of K, and how safe that is: smallest scaled border pivot.
+
+    The count is -1 where `factor` gave up. A second value near rounding (1e-10) means that K is
+    close to singular and the count may be off by one.
+    """
+    M = factors.schur.shape[0]
+    if factors.negative < 0:
+        return -1, 0.0
+    if M == 0:
+        return factors.negative, np.inf
+    scaled = np.empty((M, M))
+    for p in range(M):
+        for q in range(M):
+            size = np.sqrt(factors.magnitude[p] * factors.magnitude[q])
+            scaled[p, q] = factors.schur[p, q] / size if size > 0.0 else 0.0
+    minus, smallest = invert(scaled, 0.0, np.zeros(M))
+    return factors.negative + minus, smallest
+
+
+@njit(cache=True)
+def solve_dense(A, x):
+    """Replace ``x`` (m, r) by A^-1 x; Gaussian elimination with partial pivoting, destroys A.
+
+    Returns False, with ``x`` undefined, where a pivot is exactly zero.
+    """
+    m, r = x.shape
+    for k in range(m):
+        p = k
+        for i in range(k + 1, m):
+            if abs(A[i, k]) > abs(A[p, k]):
+                p = i
+        if A[p, k] == 0.0:
+            return False
+        if p != k:
+            for j in range(m):
+                A[k, j], A[p, j] = A[p, j], A[k, j]
+            for c in range(r):
+                x[k, c], x[p, c] = x[p, c], x[k, c]
+        for i in range(k + 1, m):
+            ratio = A[i, k] / A[k, k]
+            for j in range(k + 1, m):
+                A[i, j] -= ratio * A[k, j]
+            for c in range(r):
+                x[i, c] -= ratio * x[k, c]
+    for k in range(m - 1, -1, -1):
+        for c in range(r):
+            for j in range(k + 1, m):
+                x[k, c] -= A[k, j] * x[j, c]
+            x[k, c] /= A[k, k]
+    return True
+
+
+@njit(cache=True)
+def solve_augmented(factors, m, column, column_border, row, row_border, corner, x, y, z):
+    """Solve K with one more column and one more, unsymmetric, row, such as an arclength condition.
+
+        [ T     B              column        ] [x]   [x]
+        [ B'    0              column_border ] [y] = [y]     in place; r right-hand sides
+        [ row'  row_border'    corner        ] [z]   [z]
+
+    K itself may be singular, as it is at a fold.
+
+    Parameters
+    ----------
+    factors : of K, whose own border has ``m`` columns.
+    column, row : (n, b). column_border, row_border : (m,). corner : float.
+    x, y, z : (n, b, r), (m, r), (r,), replaced by the solution.
+
+    Returns
+    -------
+    bool : False where the augmented matrix is singular to the last digit.
+    """
+    n, b, r = x.shape
+    M = factors.schur.shape[0]
+    Y = np.empty((n, b, r + 1))
+    for j in range(n):
+        for k in range(b):
+            Y[j, k, 0] = column[j, k]
+            for c in range(r):
+                Y[j, k, c + 1] = x[j, k, c]
+    solve_band(factors.inverse, factors.lower, Y)
+    A = np.zeros((M + 1, M + 1))
+    rhs = np.zeros((M + 1, r))
+    A[:M, :M] = factors.schur
+    for p in range(m):
+        A[p, M] = column_border[p]
+        A[M, p] = row_border[p]
+        for c in range(r):
+            rhs[p, c] = y[p, c]
+    A[M, M] = corner
+    rhs[M] = z
+    for j in range(n):
+        for k in range(b):
+            for p in range(M):
+                w = factors.border[j, k, p]
+                if w != 0.0:
+                    A[p, M] -= w * Y[j, k, 0]
+                    for c in range(r):
+                        rhs[p, c] -= w * Y[j, k, c + 1]
+            w = row[j, k]
+            if w != 0.0:
+                for p in range(M):
+                    A[M, p] -= w * factors.lifted[j, k, p]
+                A[M, M] -= w * Y[j, k, 0]
+                for c in range(r):
+                    rhs[M, c] -= w * Y[j, k, c + 1]
+    if not solve_dense(A, rhs):
+        return False
+    for j in range(n):
+        for k in range(b):
+            for c in range(r):
+                s = Y[j, k, c + 1] - Y[j, k, 0] * rhs[M, c]
+                for p in range(M):
+                    s -= factors.lifted[j, k, p] * rhs[p, c]
+                x[j, k, c] = s
+    for c in range(r):
+        for p in range(m):
+            y[p, c] = rhs[p, c]
+        z[c] = rhs[M, c]
+    return True
+
+
+@njit(cache=True)
+def multiply(diag, off, border, x, y, out_x, out_y):
+    """K times (x, y): ``out_x`` (n, b, r) and ``out_y`` (m, r)."""
+    n, b, r = x.shape
+    m = border.shape[2]
+    out_x[:] = 0.0
+    out_y[:] = 0.0
+    for j in range(n):
+        for k in range(b):
+            for i in range(b):
+                for c in range(r):
+                    out_x[j, k, c] += diag[j, k, i] * x[j, i, c]
+                    if j + 1 < n:
+                        out_x[j, k, c] += off[j, k, i] * x[j + 1, i, c]
+                    if j > 0:
+                        out_x[j, k, c] += off[j - 1, i, k] * x[j - 1, i, c]
+            for p in range(m):
+                for c in range(r):
+                    out_x[j, k, c] += border[j, k, p] * y[p, c]
+                    out_y[p, c] += border[j, k, p] * x[j, k, c]

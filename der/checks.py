@@ -1,0 +1,187 @@
+"""Checks of what the user, or a file, gave: the value in its proper type, or a ValueError.
+
+Every check takes the name of the thing first, for a message like "h_over_t must be a finite number
+> 0, got -1". A bool is never a number here; numpy's scalars are what they look like.
+"""
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from numbers import Real
+from typing import Any, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+Counts: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.int64]]"
+T = TypeVar("T")
+
+
+# --- Arguments -------------------------------------------------------------------------------
+
+
+def checked_number(
+    name: str,
+    value: object,
+    allowed: str = "a finite number",
+    is_allowed: Callable[[float], bool] = lambda number: True,
+) -> float:
+    """Return `value` as a float where it is a finite real number that `is_allowed` accepts.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    value : object
+        What was given.
+    allowed : str
+        What is allowed, in words, for the message: "a finite number > 0".
+    is_allowed : callable
+        The same as a predicate of a finite float.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    ValueError
+        If `value` is not a number (a bool and a string are none), not finite, or not allowed.
+    """
+    number = math.nan
+    if isinstance(value, Real) and not isinstance(value, bool):
+        with suppress(OverflowError):  # an int too large for a float stays nan
+            number = float(value)
+    if math.isfinite(number) and is_allowed(number):
+        return number
+    shown = str(value) if isinstance(value, Real) else repr(value)
+    raise ValueError(f"{name} must be {allowed}, got {shown}")
+
+
+def positive(name: str, value: object) -> float:
+    """Return a finite number > 0."""
+    return checked_number(name, value, "a finite number > 0", lambda number: number > 0)
+
+
+def one_of(name: str, value: object, allowed: Collection[str]) -> str:
+    """Return one of the words in `allowed`."""
+    if isinstance(value, str) and value in allowed:
+        return value
+    raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")
+
+
+def checked_array(name: str, values: ArrayLike | None, shape: tuple[int | str, ...]) -> Array:
+    """Return a copy of an array of finite numbers.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    values : array_like
+        What was given.
+    shape : tuple
+        A number for every dimension of fixed length, a letter for every free one: ("n", 3).
+
+    Returns
+    -------
+    ndarray
+        Of floats.
+
+    Raises
+    ------
+    ValueError
+        If `values` is no such array, or an entry not finite.
+    """
+    wanted = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
+    try:
+        given = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        given = np.asarray(None)
+    if given.dtype.kind not in "iuf" or given.ndim != len(shape):
+        raise ValueError(f"{name} must be an array of numbers, shape {wanted}, got {values!r}")
+    if any(n != m for n, m in zip(shape, given.shape, strict=True) if isinstance(n, int)):
+        raise ValueError(f"{name} must have shape {wanted}, got {given.shape}")
+    for place in np.argwhere(~np.isfinite(given))[:1].tolist():
+        raise ValueError(f"{name} must be finite numbers, got {name}{place} = {given[*place]}")
+    return given.astype(np.float64)
+
+
+# --- Entries of a record ---------------------------------------------------------------------
+
+
+def text(name: str, value: object) -> str:
+    """Return a string."""
+    if isinstance(value, str):
+        return value
+    raise ValueError(f"{name} must be a text, got {value!r}")
+
+
+def truth(name: str, value: object) -> bool:
+    """Return a bool."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise ValueError(f"{name} must be true or false, got {value!r}")
+
+
+def count(name: str, value: object) -> int:
+    """Return a whole number >= 0 that fits 64 bits."""
+    if isinstance(value, int | np.integer) and not isinstance(value, bool) and 0 <= value < 2**63:
+        return int(value)
+    raise ValueError(f"{name} must be a whole number >= 0, got {value!r}")
+
+
+def optional(check: Callable[[str, Any], T]) -> Callable[[str, Any], T | None]:
+    """Return the check that lets None pass as well."""
+    return lambda name, value: None if value is None else check(name, value)
+
+
+def numbers(name: str, values: object) -> Array:
+    """Return a read-only copy of a list or a one-dimensional array of finite numbers."""
+    array = np.array(each(name, values, checked_number), dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def counts(name: str, values: object) -> Counts:
+    """Return a read-only copy of a list of counts and None, or of a masked array of integers."""
+    known = each(name, values, optional(count))
+    data = np.array([value or 0 for value in known], dtype=np.int64)
+    mask = np.array([value is None for value in known], dtype=np.bool_)
+    data.setflags(write=False)
+    mask.setflags(write=False)
+    return np.ma.MaskedArray(data, mask=mask, copy=False)
+
+
+def each(name: str, values: object, check: Callable[[str, Any], T]) -> list[T]:
+    """Return the checked entries of a list or array, of which an array's masked ones are None."""
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if not isinstance(values, list | tuple):
+        raise ValueError(f"{name} must be a list, got {values!r}")
+    return [check(f"{name}[{i}]", value) for i, value in enumerate(values)]
+
+
+def json_object(name: str, value: object) -> dict[str, Any]:
+    """Return a copy of a mapping in JSON's own types, so that it comes back as it is here."""
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a mapping, got {value!r}")
+    return {
+        text(f"a key of {name}", key): _json_value(f"{name}.{key}", entry)
+        for key, entry in value.items()
+    }
+
+
+def _json_value(name: str, value: object) -> object:
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return checked_number(name, value)
+    if isinstance(value, Mapping):
+        return json_object(name, value)
+    if isinstance(value, list | tuple):
+        return each(name, value, _json_value)
+    raise ValueError(f"{name} must be something JSON can hold, got a {type(value).__name__}")

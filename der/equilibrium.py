@@ -1,0 +1,340 @@
+"""Newton's method for an equilibrium of a supported rod, and the path's tangent there.
+
+Three conditions can close the system of equilibrium equations, in which the load is one of the
+unknowns: the load is given, the generalised moment is given, or the correction is orthogonal to a
+direction (pseudo-arclength). The index and the tangent come from the factors of the last iterate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from der.assembly import assemble, take_out
+from der.block_ldl import factor, inertia, solve_augmented
+from der.frames import Array, into_frame, turned
+from der.rod import Rod, State
+from der.supports import Supports
+
+_LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the path
+
+
+class Control(IntEnum):
+    """Which condition closes the equilibrium equations."""
+
+    LOAD = 0
+    DIRECTION = 1
+    MOMENT = 2
+
+
+class Outcome(IntEnum):
+    """How a solve ended."""
+
+    CONVERGED = 0
+    TOO_MANY_ITERATIONS = 1
+    DIVERGED = 2
+    BENT_TOO_FAR = 3
+    SINGULAR = 4
+
+
+ADVICE = {
+    Outcome.CONVERGED: "converged",
+    Outcome.TOO_MANY_ITERATIONS: "Newton's method did not converge; try a closer start",
+    Outcome.DIVERGED: "Newton's method left the neighbourhood of its start; try a smaller step",
+    Outcome.BENT_TOO_FAR: "turns or twists by more than 160 degrees; use more edges",
+    Outcome.SINGULAR: "the tangent matrix is singular to the last digit",
+}
+
+
+class Direction(NamedTuple):
+    """A rate of change of a state along a path."""
+
+    q: Array  # (n, b) rotation vectors in the frames, and stretch
+    force: Array  # (n_c,)
+    load: float
+
+
+class Correction(NamedTuple):
+    """What the kernel returns; see `Equilibrium` for the meaning of the entries."""
+
+    outcome: int
+    where: int
+    iterations: int
+    residual: float
+    quat: Array
+    stretch: Array
+    force: Array
+    load: float
+    energy: float
+    moment: float
+    q_rate: Array
+    force_rate: Array
+    load_rate: float
+    moment_rate: float
+    negative: int
+    margin: float
+
+
+@dataclass(frozen=True, slots=True)
+class Equilibrium:
+    """An equilibrium, or, where ``outcome`` is not CONVERGED, the last iterate."""
+
+    state: State
+    outcome: Outcome
+    where: int  # vertex that is bent too far; -1: none
+    iterations: int
+    residual: float  # largest entry of gradient and position gap, GJ/a and a
+    energy: float  # elastic energy of the rod as given (a sector's, not the ring's)
+    moment: float  # dL/dload, work-conjugate to the load
+    tangent: Direction  # of the path, of unit length in the mass-weighted norm
+    moment_rate: float  # d moment along the tangent
+    negative: int  # negative eigenvalues of the bordered matrix; -1: the factorisation gave up
+    margin: float  # smallest scaled pivot; the count is safe above rounding (1e-10)
+
+    @property
+    def converged(self) -> bool:
+        """Whether this is an equilibrium."""
+        return self.outcome is Outcome.CONVERGED
+
+    @property
+    def slope(self) -> float:
+        """D moment/d load along the path; infinite at a fold."""
+        rate = self.tangent.load
+        return self.moment_rate / rate if rate != 0.0 else np.inf
+
+
+@njit(cache=True)
+def _correct(
+    rod, held, quat, stretch, force, load, control, row, row_load, moment, tolerance, most
+):
+    n, b = held.free.shape
+    n_c = held.target.shape[0]
+    quat = quat.copy()
+    stretch = stretch.copy()
+    force = force.copy()
+    x = np.zeros((n, b, 1))
+    y = np.zeros((n_c, 1))
+    z = np.zeros(1)
+    axis = np.empty(3)
+    no_row = np.zeros((n, b))
+    no_border = np.zeros(n_c)
+    first = 0.0
+    outcome = 1
+    iteration = 0
+    index, margin, residual = -1, 0.0, np.inf
+    system = assemble(rod, held, quat, stretch, force, load)
+    while True:
+        residual = 0.0
+        for j in range(n):
+            for i in range(b):
+                if held.free[j, i]:
+                    residual = max(residual, abs(system.grad[j, i]))
+        for k in range(n_c):
+            residual = max(residual, abs(system.gap[k]))
+        if control == 2:
+            residual = max(residual, abs(system.load_grad - moment))
+        if iteration == 0:
+            first = residual
+        if not np.isfinite(residual) or (iteration > 1 and residual > 1e3 * max(first, 1.0)):
+            outcome = 2
+            break
+        if system.bent_too_far >= 0:
+            outcome = 3
+            break
+        done = residual <= max(tolerance, 10.0 * system.noise)
+        if not done and iteration >= most:
+            break
+        diag, off, border = take_out(held.free, system.diag, system.off, system.border)
+        column = np.where(held.free, system.load_column, 0.0)
+        factors = factor(diag, off, border)
+        if done:
+            # the tangent: K (q, force) + load column = 0, normalised along the given direction
+            index, margin = inertia(factors)
+            x[:] = 0.0
+            y[:] = 0.0
+            z[0] = 1.0
+            solved = solve_augmented(
+                factors, n_c, column, system.load_border, row, no_border, row_load, x, y, z
+            )
+            outcome = 0 if solved else 4
+            break
+        for j in range(n):
+            for i in range(b):
+                x[j, i, 0] = -system.grad[j, i] if held.free[j, i] else 0.0
+        for k in range(n_c):
+            y[k, 0] = -system.gap[k]
+        z[0] = 0.0
+        if control == 0:
+            solved = solve_augmented(
+                factors, n_c, column, system.load_border, no_row, no_border, 1.0, x, y, z
+            )
+        elif control == 1:
+            solved = solve_augmented(
+                factors, n_c, column, system.load_border, row, no_border, row_load, x, y, z
+            )
+        else:
+            z[0] = moment - system.load_grad
+            solved = solve_augmented(
+                factors,
+                n_c,
+                column,
+                system.load_border,
+                column,
+                system.load_border,
+                system.load_hess,
+                x,
+                y,
+                z,
+            )
+        if control == 0:
+            z[0] = 0.0  # the load is given: not even rounding moves it
+        if not solved:
+            outcome = 4
+            break
+        largest = abs(z[0])
+        for j in range(n):
+            for i in range(3):
+                largest = max(largest, abs(x[j, i, 0]))
+        if not largest < _LARGEST_TURN:
+            outcome = 2
+            break
+        _move(held, quat, stretch, force, x[:, :, 0], y[:, 0], z[0], axis)
+        load += z[0]
+        iteration += 1
+        system = assemble(rod, held, quat, stretch, force, load)
+
+    rate = Direction(x[:, :, 0].copy(), y[:, 0].copy(), z[0])
+    moment_rate = 0.0
+    if outcome == 0:
+        norm = 0.0
+        total = 0.0
+        for j in range(n):
+            total += rod.length[j]
+            for i in range(b):
+                norm += rod.length[j] * rate.q[j, i] ** 2
+        norm = np.sqrt(norm / total + rate.load**2)
+        rate = Direction(rate.q / norm, rate.force / norm, rate.load / norm)
+        moment_rate = system.load_hess * rate.load
+        for j in range(n):
+            for i in range(b):
+                if held.free[j, i]:
+                    moment_rate += system.load_column[j, i] * rate.q[j, i]
+        for k in range(n_c):
+            moment_rate += system.load_border[k] * rate.force[k]
+    return Correction(
+        outcome,
+        system.bent_too_far,
+        iteration,
+        residual,
+        quat,
+        stretch,
+        force,
+        load,
+        system.energy,
+        system.load_grad,
+        rate.q,
+        rate.force,
+        rate.load,
+        moment_rate,
+        index,
+        margin,
+    )
+
+
+@njit(cache=True)
+def _move(held, quat, stretch, force, dq, dforce, dload, axis):
+    """Add an increment to ``quat``, ``stretch`` and ``force`` in place; ``axis`` (3,) is scratch.
+
+    The frames that turn with the load turn about a fixed axis, so theirs is exact at any angle.
+    """
+    n, b = dq.shape
+    for j in range(n):
+        for i in range(3):
+            axis[i] = dq[j, i]
+        if held.turn[j] != 0.0:
+            into_frame(quat[j], held.turn_axis, axis)
+            for i in range(3):
+                axis[i] *= held.turn[j] * dload
+        turned(quat[j], axis, quat[j])
+        if b == 4:
+            stretch[j] += dq[j, 3]
+    for k in range(force.shape[0]):
+        force[k] += dforce[k]
+
+
+def weights(body: Rod) -> Array:
+    """Mass-weights (n, 1) of the edges in the norm of directions: they sum to 1."""
+    return (body.length / body.length.sum())[:, None]
+
+
+def dot(mass: Array, a: Direction, b: Direction) -> float:
+    """Inner product of two directions, independent of the mesh; forces do not enter."""
+    return float(np.sum(mass * a.q * b.q) + a.load * b.load)
+
+
+def moved(held: Supports, state: State, step: Direction) -> State:
+    """``state`` moved by the increment ``step``."""
+    quat, stretch, force = state.quat.copy(), state.stretch.copy(), state.force.copy()
+    _move(held, quat, stretch, force, step.q, step.force, step.load, np.empty(3))
+    return State(quat, stretch, force, state.load + step.load)
+
+
+def equilibrium(
+    body: Rod,
+    held: Supports,
+    start: State,
+    *,
+    along: Direction | None = None,
+    control: Control = Control.LOAD,
+    moment: float = 0.0,
+    tolerance: float = 1e-10,
+    iterations: int = 12,
+) -> Equilibrium:
+    """Newton's method from ``start``.
+
+    Parameters
+    ----------
+    along : direction that orients the tangent and, with Control.DIRECTION, stays orthogonal to
+        every correction; default: increasing load.
+    moment : value of dL/dload with Control.MOMENT.
+    tolerance : of the residual; rounding sets a floor of ten times its estimate.
+
+    Notes
+    -----
+    Failure is a value: see `Equilibrium.outcome` and `ADVICE`.
+    """
+    if along is None:
+        row, row_load = np.zeros(held.free.shape), 1.0
+    else:
+        row, row_load = weights(body) * along.q, along.load
+    c = _correct(
+        body,
+        held,
+        start.quat,
+        start.stretch,
+        start.force,
+        start.load,
+        int(control),
+        row,
+        row_load,
+        moment,
+        tolerance,
+        iterations,
+    )
+    return Equilibrium(
+        State(c.quat, c.stretch, c.force, c.load),
+        Outcome(c.outcome),
+        c.where,
+        c.iterations,
+        c.residual,
+        c.energy,
+        c.moment,
+        Direction(c.q_rate, c.force_rate, c.load_rate),
+        c.moment_rate,
+        c.negative,
+        c.margin,
+    )

@@ -1,0 +1,249 @@
+"""Folding a ring: from the scene to the record."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+from der.assembly import assemble
+from der.path import Stuck, Tally, Visit, Wanted, follow, three_covered
+from der.record import AtPi, Path, Point, Shapes, Timing, counts, folding_mode
+from der.rod import State
+from der.scene import Scene
+from der.sector import Sector, free_ring, sector
+from der.stability import all_modes, index
+
+_NO_MOMENT = 1e-6  # of the largest |M|: a state of rest
+_BALANCED = 1e-6  # residual, of the largest bending moment, of a free ring at rest
+
+
+class NotConverged(RuntimeError):
+    """A path that could not be followed to its end.
+
+    Attributes
+    ----------
+    path : what was found, up to and with the last good state.
+    """
+
+    def __init__(self, message: str, path: Path) -> None:
+        super().__init__(message)
+        self.path = path
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C in the middle of a path.
+
+    Attributes
+    ----------
+    path : what was found, up to and with the last good state.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__("interrupted")
+        self.path = path
+
+
+def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> Path:
+    """The path of equilibria of a ring from flat (gamma = 0) on, with what is special on it.
+
+    Parameters
+    ----------
+    scene : the ring, its section and what is wanted.
+    progress : called with gamma [rad] after every state.
+
+    Returns
+    -------
+    Path
+        Moments of one arm and energies of the full ring, in units of GJ/a.
+
+    Raises
+    ------
+    ValueError
+        For a ring that this solver cannot do yet.
+    NotConverged
+        Where the path cannot be followed to its end; has the path so far.
+    Interrupted
+        At Ctrl-C; has the path so far.
+    """
+    if scene.ring.shape != "circle":
+        raise ValueError(f"ring must be a circle (der.circle), got a {scene.ring.shape}")
+    piece = sector(
+        scene.ring,
+        scene.section,
+        scene.n_edges,
+        name=scene.sector,
+        measure=scene.curvature,
+        stretching=scene.stretching,
+    )
+    until_folded = scene.until == "folded"
+    beyond = scene.gamma_max > math.pi
+    wanted = Wanted(
+        load_max=math.inf if until_folded and not beyond else scene.gamma_max,
+        until_folded=until_folded,
+        targets=None if scene.save_at is None else tuple(scene.save_at),
+        stability=scene.stability,
+        contacts=scene.looks_for_contacts,
+        tolerance=scene.tolerance,
+    )
+    tally = Tally()
+    visits: list[Visit] = []
+    started = time.perf_counter()
+
+    def record(status: str, message: str = "") -> Path:
+        timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
+        return _record(scene, piece, visits, timing, status, message)
+
+    try:
+        for visit in follow(piece, wanted, tally):
+            visits.append(visit)
+            if progress is not None:
+                progress(visit.at.state.load)
+    except Stuck as stuck:
+        raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
+    except KeyboardInterrupt:
+        raise Interrupted(record("interrupted", "stopped by the user")) from None
+    return record("done")
+
+
+def _record(
+    scene: Scene,
+    piece: Sector,
+    visits: list[Visit],
+    timing: Timing,
+    status: str,
+    message: str,
+) -> Path:
+    """The record of what was visited."""
+    indices = [_full_index(piece, visit) for visit in visits]
+    moments = np.array([piece.moment(visit.at.moment) for visit in visits])
+    points = tuple(_points(piece, visits, indices))
+    at_pi = mode = None
+    for k, visit in enumerate(visits):
+        if visit.at.state.load == math.pi:
+            at_rest = abs(moments[k]) <= _NO_MOMENT * float(np.abs(moments).max())
+            free = _free_index(scene, piece, visit) if at_rest and scene.stability else None
+            at_pi = AtPi(
+                float(moments[k]),
+                piece.moment(visit.at.slope),
+                piece.copies * visit.at.energy,
+                indices[k],
+                _moment_index(visit, indices[k]),
+                free,
+            )
+            end = slice(0, k + 1)
+            before = tuple(point for point in points if point.position <= k)
+            gamma = np.array([v.at.state.load for v in visits[end]])
+            mode = folding_mode(
+                gamma, moments[end], before, at_pi, three_covered=three_covered(piece, visit.at)
+            )
+            break
+    return Path(
+        solver="der",
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=_numerics(scene, piece),
+        gamma=np.array([visit.at.state.load for visit in visits]),
+        moment=moments,
+        energy=np.array([piece.copies * visit.at.energy for visit in visits]),
+        index=counts(indices),
+        index_moment=counts([_moment_index(v, i) for v, i in zip(visits, indices, strict=True)]),
+        points=points,
+        at_pi=at_pi,
+        mode=mode,
+        error=None,
+        timing=timing,
+        shapes=_shapes(piece, visits) if scene.shapes else None,
+        status=status,
+        message=message,
+    )
+
+
+def _full_index(piece: Sector, visit: Visit) -> int | None:
+    """Index of the full ring: the sum over the classes, pairs counted twice."""
+    if visit.index is None:
+        return None
+    total = 0
+    for (multiplicity, _), count in zip(piece.classes.values(), visit.index, strict=True):
+        if count is None:
+            return None
+        total += multiplicity * count
+    return total
+
+
+def _moment_index(visit: Visit, held: int | None) -> int | None:
+    """Index with the moment held: one more where dM/dgamma < 0; unknown where it vanishes."""
+    if held is None or visit.kind == "limit":
+        return None
+    return held + (visit.at.slope < 0.0)
+
+
+def _points(piece: Sector, visits: list[Visit], indices: list[int | None]) -> list[Point]:
+    """The special points, with the index on their two sides."""
+    points = []
+    for k, visit in enumerate(visits):
+        if not visit.kind:
+            continue
+        before = after = indices[k]
+        if before is None:  # a fold or a branch: the index is that of its neighbours
+            before = next((i for i in reversed(indices[:k]) if i is not None), None)
+            after = next((i for i in indices[k + 1 :] if i is not None), None)
+        at = visit.at
+        numbers = (at.state.load, piece.moment(at.moment), piece.copies * at.energy)
+        points.append(Point(visit.kind, *numbers, before, after, k, visit.details))
+    return points
+
+
+def _free_index(scene: Scene, piece: Sector, visit: Visit) -> int | None:
+    """Index of the ring with its grips removed, rigid motions taken out, if it stays at rest."""
+    whole = sector(
+        scene.ring,
+        scene.section,
+        scene.n_edges,
+        name="full",
+        measure=scene.curvature,
+        stretching=scene.stretching,
+    )
+    held = free_ring(whole.body)
+    quat = piece.full_frames(visit.at.state)
+    stretch = piece.full_lengths(visit.at.state) / whole.body.length - 1.0
+    state = State(quat, stretch, np.zeros(3), 0.0)
+    system = assemble(whole.body, held, quat, stretch, state.force, 0.0)
+    free = held.free.reshape(-1)
+    residual = system.grad.reshape(-1)[free]
+    border = system.border.reshape(-1, 3)[free]
+    force = -np.linalg.lstsq(border, residual, rcond=None)[0]
+    scale = float(np.abs(system.diag).max() * whole.body.cell.max())
+    if float(np.abs(residual + border @ force).max()) > _BALANCED * scale:
+        return None
+    return index(whole.body, held, all_modes(held), state.but(force=force))
+
+
+def _shapes(piece: Sector, visits: list[Visit]) -> Shapes:
+    """Vertices and frames of the full ring at every state."""
+    shapes = [piece.shape(visit.at.state) for visit in visits]
+    return Shapes(np.array([x for x, _ in shapes]), np.array([frames for _, frames in shapes]))
+
+
+def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
+    try:
+        release = version("ring-origami")
+    except PackageNotFoundError:  # run from a source tree that was never installed
+        release = "unknown"
+    return {
+        "n_edges": scene.n_edges,
+        "sector": piece.name,
+        "curvature": scene.curvature,
+        "stretch": scene.stretch,
+        "a_over_t": scene.a_over_t,
+        "tolerance": scene.tolerance,
+        "gamma_max": scene.gamma_max,
+        "until": scene.until,
+        "save_at": None if scene.save_at is None else list(scene.save_at),
+        "stability": scene.stability,
+        "version": release,
+    }

@@ -1,0 +1,156 @@
+"""Twist, writhe and link of a closed ribbon.
+
+Lk = Tw + Wr (Calugareanu, White, Fuller) holds exactly for a polygon when Tw sums the twist that
+parallel transport over each vertex leaves (`strain`) and Wr is the polygon's Gauss integral. Lk is
+an integer at every state without self-crossing and jumps by +-2 when a strand passes through
+another, which is how the passages of the ideal ring are found.
+"""
+
+import numpy as np
+from numba import njit
+
+from der.frames import Array, relative, tangent
+
+
+@njit(cache=True)
+def twist(quat):
+    """Total twist (turns) of the closed ribbon with edge frames ``quat`` (n, 4)."""
+    n = quat.shape[0]
+    p = np.empty(4)
+    total = 0.0
+    for j in range(n):
+        relative(quat[j], quat[(j + 1) % n], p)
+        total += np.arctan(p[3] / p[0]) if p[0] != 0.0 else 0.5 * np.pi
+    return total / np.pi
+
+
+@njit(cache=True)
+def writhe(x, copies):
+    """Writhe of the closed polygon with vertices ``x`` (n, 3): Klenin & Langowski 2000, method 1a.
+
+    Edge j ends at vertex j. Of a polygon made of ``copies`` half-turn images, one sector's edges
+    are paired with all; the edges in its two planes of symmetry belong to it by half.
+    """
+    n = x.shape[0]
+    last = n // copies if copies > 1 else n - 1
+    total = 0.0
+    for i in range(last + 1):
+        share = 0.5 if copies > 1 and (i == 0 or i == last) else 1.0
+        for k in range(n):
+            apart = abs(i - k)
+            if apart > 1 and apart < n - 1:
+                total += share * _solid_angle(x, i, k)
+    return copies * total / (4.0 * np.pi)
+
+
+@njit(cache=True)
+def _solid_angle(x, i, k):
+    """Signed area on the sphere of the directions from edge ``i`` to edge ``k``."""
+    n = x.shape[0]
+    i1, k1 = i, k
+    i, k = (i - 1) % n, (k - 1) % n
+    ax, ay, az = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    bx, by, bz = x[k1, 0] - x[i, 0], x[k1, 1] - x[i, 1], x[k1, 2] - x[i, 2]
+    cx, cy, cz = x[k1, 0] - x[i1, 0], x[k1, 1] - x[i1, 1], x[k1, 2] - x[i1, 2]
+    dx, dy, dz = x[k, 0] - x[i1, 0], x[k, 1] - x[i1, 1], x[k, 2] - x[i1, 2]
+    # two triangles, Van Oosterom & Strackee 1983: one arctangent each
+    a = np.sqrt(ax * ax + ay * ay + az * az)
+    b = np.sqrt(bx * bx + by * by + bz * bz)
+    c = np.sqrt(cx * cx + cy * cy + cz * cz)
+    d = np.sqrt(dx * dx + dy * dy + dz * dz)
+    ab = ax * bx + ay * by + az * bz
+    bc = bx * cx + by * cy + bz * cz
+    ca = cx * ax + cy * ay + cz * az
+    cd = cx * dx + cy * dy + cz * dz
+    da = dx * ax + dy * ay + dz * az
+    abc = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    acd = ax * (cy * dz - cz * dy) + ay * (cz * dx - cx * dz) + az * (cx * dy - cy * dx)
+    first = np.arctan2(abc, a * b * c + ab * c + bc * a + ca * b)
+    second = np.arctan2(acd, a * c * d + ca * d + cd * a + da * c)
+    return -2.0 * (first + second)
+
+
+@njit(cache=True)
+def unfold(quat, copies):
+    """Frames (N, 4) of the whole ring from those of a sector, from the first grip on.
+
+    A quarter (``copies`` = 4) runs from a free point to the second grip, a half (2) from grip to
+    grip. Half-turns about E2 and E3 that run the curve backwards carry d2 along and reverse d1 and
+    d3: q -> e2 q e2 and q -> e3 q e2.
+    """
+    n = quat.shape[0]
+    if copies == 1:
+        return quat.copy()
+    arm = n if copies == 2 else 2 * n - 1
+    out = np.empty((2 * arm - 2, 4))
+    shift = arm - n
+    out[shift:arm] = quat
+    for j in range(shift):
+        q = quat[shift - j]
+        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = -q[0], q[1], -q[2], q[3]
+    for j in range(arm, 2 * arm - 2):
+        q = out[2 * arm - 2 - j]
+        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = -q[1], -q[0], -q[3], -q[2]
+    return out
+
+
+@njit(cache=True)
+def unfold_lengths(length, copies):
+    """Edge lengths (N,) of the whole ring from those (n,) of a sector, whose ends are half edges."""
+    n = length.shape[0]
+    if copies == 1:
+        return length.copy()
+    arm = n if copies == 2 else 2 * n - 1
+    out = np.empty(2 * arm - 2)
+    shift = arm - n
+    for j in range(n):
+        out[shift + j] = length[j] * (2.0 if j == 0 or j == n - 1 else 1.0)
+    for j in range(shift):
+        out[j] = out[2 * shift - j]
+    for j in range(arm, 2 * arm - 2):
+        out[j] = out[2 * arm - 2 - j]
+    return out
+
+
+@njit(cache=True)
+def vertices(quat, length):
+    """Vertices (N, 3) of the closed ring with these edges; the origin is midway between the grips.
+
+    Vertex j ends edge j; the grips are the middles of edges 0 and N/2.
+    """
+    n = quat.shape[0]
+    x = np.empty((n, 3))
+    d3 = np.empty(3)
+    before = np.zeros(3)
+    origin = np.zeros(3)
+    for j in range(n):
+        tangent(quat[j], d3)
+        for i in range(3):
+            step = length[j] * d3[i]
+            if j == 0 or j == n // 2:
+                origin[i] += 0.5 * (before[i] + 0.5 * step)
+            before[i] += step
+            x[j, i] = before[i]
+    for j in range(n):
+        for i in range(3):
+            x[j, i] -= origin[i]
+    return x
+
+
+@njit(cache=True)
+def link_number(quat, length, copies):
+    """Tw + Wr of the ring made of ``copies`` of a sector with frames (n, 4) and lengths (n,)."""
+    whole = unfold(quat, copies)
+    return twist(whole) + writhe(vertices(whole, unfold_lengths(length, copies)), copies)
+
+
+def link(quat: Array, length: Array, copies: int = 1) -> tuple[int, float]:
+    """Linking number, and by how much Tw + Wr misses the integer.
+
+    Parameters
+    ----------
+    quat : (n, 4) edge frames of the sector. length : (n,) its edge lengths.
+    copies : number of half-turn images of which the ring is made: 1, 2 or 4.
+    """
+    number = float(link_number(quat, length, copies))
+    return round(number), abs(number - round(number))

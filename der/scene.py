@@ -1,0 +1,141 @@
+"""The scene: a ring, its section, and what is asked of it. No kernels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+
+from der.ring import Ring
+from der.sections import Section
+
+MEASURES = ("logarithm", "angle", "tangent")  # of curvature, see strain.py
+STRETCH = ("inextensible", "finite")
+COPIES = {"full": 1, "half": 2, "quarter": 4}  # how many of a sector make the ring
+
+FEWEST_EDGES = 8
+MOST_EDGES = 65_536
+CONTACTS_UP_TO = 1024  # edges; the writhe that finds contacts costs O(N^2)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A ring to be folded by twisting, and what is wanted of its path.
+
+    Parameters
+    ----------
+    ring : the closed planar shape with its grips, from `circle` and its like.
+    section : stiffness ratios, from `rectangular_section` or `section`.
+    n_edges : edges of the full ring; even, and divisible by 4 where a quarter is solved.
+    sector : the piece to march on: "full", "half", "quarter", or "auto", the smallest that the
+        ring's symmetry allows.
+    stability : whether to compute the index of the full ring at every state.
+    contacts : whether to look for passages of a strand through another; None: up to 1024 edges.
+    shapes : whether to keep vertices and frames of every state.
+    gamma_max : the path ends at its first arrival there [rad].
+    until : "folded": go on, beyond pi and back, until the three-covered state at pi is reached;
+        ``gamma_max`` then only ends the path where it is above pi.
+    save_at : values of gamma at which states are solved for [rad]; None: multiples of pi/8.
+    curvature : measure of curvature, one of `MEASURES`.
+    stretch : "inextensible", or "finite": EA = 12 EI1 (a_over_t / a)^2, a rectangular section's.
+    a_over_t : reference length over thickness; matters for finite stretch and for drawing.
+    tolerance : of the residual of an equilibrium, GJ/a.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, its value and what is allowed.
+    """
+
+    ring: Ring
+    section: Section
+    _: KW_ONLY
+    n_edges: int = 64
+    sector: str = "auto"
+    stability: bool = True
+    contacts: bool | None = None
+    shapes: bool = False
+    gamma_max: float = math.pi
+    until: str | None = None
+    save_at: Sequence[float] | None = None
+    curvature: str = "logarithm"
+    stretch: str = "inextensible"
+    a_over_t: float = 200.0
+    tolerance: float = 1e-10
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.ring, Ring):
+            raise ValueError(f"ring must be a der.Ring such as der.circle(), got {self.ring!r}")
+        if not isinstance(self.section, Section):
+            raise ValueError(
+                f"section must be a der.Section such as der.rectangular_section(4.0), "
+                f"got {self.section!r}"
+            )
+        sector_name(self.ring, self.sector, self.n_edges)
+        _one_of("curvature", self.curvature, MEASURES)
+        _one_of("stretch", self.stretch, STRETCH)
+        if self.until is not None:
+            _one_of("until", self.until, ("folded",))
+        _positive("gamma_max", self.gamma_max)
+        _positive("a_over_t", self.a_over_t)
+        _positive("tolerance", self.tolerance)
+        if self.tolerance > 1e-4:
+            raise ValueError(f"tolerance must be at most 1e-4, got {self.tolerance!r}")
+        if self.save_at is not None:
+            self._check_save_at(self.save_at)
+
+    def _check_save_at(self, values: Sequence[float]) -> None:
+        last = math.inf if self.until == "folded" else self.gamma_max
+        for gamma in values:
+            if not (_is_number(gamma) and 0.0 <= gamma <= last):
+                allowed = "at least 0" if last == math.inf else f"between 0 and gamma_max = {last}"
+                raise ValueError(f"save_at must hold finite numbers {allowed}, got {gamma!r}")
+        object.__setattr__(self, "save_at", tuple(sorted({float(gamma) for gamma in values})))
+
+    @property
+    def stretching(self) -> float:
+        """EA in GJ/a^2; 0 for an inextensible ring."""
+        return 12.0 * self.section.alpha * self.a_over_t**2 if self.stretch == "finite" else 0.0
+
+    @property
+    def looks_for_contacts(self) -> bool:
+        """Whether passages of a strand through another are looked for."""
+        return self.n_edges <= CONTACTS_UP_TO if self.contacts is None else self.contacts
+
+
+def sector_name(ring: Ring, name: str, n_edges: int) -> str:
+    """The sector meant by ``name``, after checking that the ring has it and the edges divide.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, its value and what is allowed.
+    """
+    _one_of("sector", name, ("auto", *COPIES))
+    if isinstance(n_edges, bool) or not isinstance(n_edges, int):
+        raise ValueError(f"n_edges must be a whole number, got {n_edges!r}")
+    if name == "auto":
+        name = "quarter" if ring.symmetry == "D2" else "half"
+    if name == "quarter" and ring.symmetry != "D2":
+        raise ValueError(f"sector must be auto, half or full for a {ring.shape}, got 'quarter'")
+    divisor = 4 if name == "quarter" else 2
+    if n_edges % divisor or not FEWEST_EDGES <= n_edges <= MOST_EDGES:
+        raise ValueError(
+            f"n_edges must be from {FEWEST_EDGES} to {MOST_EDGES} and divisible by {divisor}"
+            f" for the sector {name!r}, got {n_edges}"
+        )
+    return name
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _positive(name: str, value: object) -> None:
+    if not _is_number(value) or value <= 0:  # type: ignore[operator]
+        raise ValueError(f"{name} must be a finite number > 0, got {value!r}")
+
+
+def _one_of(name: str, value: object, allowed: Sequence[str]) -> None:
+    if value not in allowed:
+        raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")

@@ -1,0 +1,71 @@
+"""A path in a few lines of text, for the terminal."""
+
+from __future__ import annotations
+
+import math
+
+from der.record import AtPi, Mode, Path, Point
+
+
+def summary(path: Path) -> str:
+    """What a user wants to know first: the ring, its mode, the special points, the cost."""
+    lines = [headline(path)]
+    if path.mode is not None:
+        lines.append(mode_in_words(path.mode))
+    elif path.status == "done":
+        lines.append(f"ends at gamma = {path.gamma[-1]:.6g}, before pi")
+    if path.points:
+        lines += ["", f"{'':9}{'gamma':>12}{'gamma/pi':>10}{'M a/GJ':>12}{'U a/GJ':>12}  index"]
+        lines += [_row(point) for point in path.points]
+    if path.at_pi is not None:
+        lines += ["", _at_pi(path.at_pi)]
+    t = path.timing
+    lines.append(
+        f"{len(path)} states, {t.steps} steps, {t.newton_iterations} Newton iterations, "
+        f"{1e3 * t.solve_s:.0f} ms"
+    )
+    return "\n".join(lines)
+
+
+def headline(path: Path) -> str:
+    """Ring, section and mesh in one line."""
+    ring = ", ".join(
+        f"{name.replace('_over_', '/').replace('_', ' ')} {value:g}"
+        for name, value in path.ring.items()
+        if isinstance(value, float)
+    )
+    section = f"alpha {path.section['alpha']:.6g}, beta {path.section['beta']:.6g}"
+    if path.section.get("h_over_t") is not None:
+        section = f"h/t {path.section['h_over_t']:g}, nu {path.section['nu']:g} ({section})"
+    return f"{path.ring['shape']} ({ring}), {section}, {path.numerics['n_edges']} edges"
+
+
+def mode_in_words(mode: Mode) -> str:
+    """The folding mode as a phrase."""
+    words = ["foldable" if mode.foldable else "not foldable"]
+    if mode.stable is not None:
+        words.append("stable when folded" if mode.stable else "unstable when folded")
+    words.append("no snap" if mode.snapping == "none" else mode.snapping)
+    if mode.stable_3d is not None:
+        words.append("stable in 3D at pi" if mode.stable_3d else "unstable in 3D at pi")
+    return ", ".join(words)
+
+
+def _row(point: Point) -> str:
+    before, after = ("?" if i is None else i for i in (point.index_before, point.index_after))
+    index = f"{before}" if before == after else f"{before} -> {after}"
+    extra = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in point.details.items())
+    numbers = f"{point.gamma:12.8f}{point.gamma / math.pi:10.6f}{point.moment:12.7f}"
+    return f"{point.kind:9}{numbers}{point.energy:12.7f}  {index:7} {extra}".rstrip()
+
+
+def _at_pi(at: AtPi) -> str:
+    index = ", ".join(
+        f"{name} {'unknown' if value is None else value}"
+        for name, value in (
+            ("index", at.index),
+            ("moment held", at.index_moment),
+            ("grips removed", at.index_free),
+        )
+    )
+    return f"at pi: M = {at.moment:.7g}, dM/dgamma = {at.slope:.7g}, U = {at.energy:.10g}; {index}"

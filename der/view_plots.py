@@ -1,0 +1,364 @@
+"""A path as one picture: snapshots of the ring above M(gamma) and U(gamma).
+
+The only file that imports matplotlib; figures are objects of their own, so that nothing global
+changes and no display is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path as File
+from typing import TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from der.files import FilePath, write_whole
+from der.record import Mode, Path
+
+Array: TypeAlias = NDArray[np.float64]
+
+FORMATS = (".png", ".pdf", ".svg")
+SIZE, DPI = (8.0, 6.0), 150  # inches; 1200 x 900 px
+INK, QUIET = "#222222", "#8a8a8a"
+# line style of a stretch by whether it is stable; blue and vermilion of Okabe and Ito
+STRETCHES = {
+    True: ("stable, γ held", "#0072B2", "-"),
+    False: ("unstable, γ held", "#D55E00", (0, (3.5, 1.6))),
+    None: ("equilibrium (stability not computed)", "#0072B2", "-"),
+}
+MARKS = {  # label, marker, size
+    "fold": ("fold", "D", 4.6),
+    "limit": ("limit of the moment", "^", 5.6),
+    "branch": ("branch point", "s", 4.8),
+    "snap": ("snap", "*", 8.0),
+    "contact": ("strands pass through each other", "x", 4.6),
+}
+
+MOST_SNAPSHOTS = 6
+ACROSS = 240  # quadrilaterals along a ribbon
+HALF_WIDTH = 0.085  # of a ribbon, over the flat ring's mean radius: exaggerated, to be seen
+FRONT, BACK, GRIP = (0.36, 0.61, 0.80), (0.93, 0.72, 0.42), (0.20, 0.20, 0.20)
+CAMERA = np.array([0.80, 0.45, 0.40])  # the ring lies in the plane of the last two axes
+LIGHT = np.array([0.75, -0.30, 0.60])
+
+
+def figure_of_path(path: Path) -> Figure:
+    """Figure of a path: M and U against gamma, below a row of snapshots where it has shapes.
+
+    Parameters
+    ----------
+    path : Path
+        With at least one state.
+
+    Raises
+    ------
+    ValueError
+        If the path has no state.
+    """
+    if not len(path):
+        raise ValueError("path must have at least one state to be plotted, got none")
+    figure = Figure(figsize=SIZE, dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    figure.text(0.5, 0.972, _title(path), ha="center", va="center", fontsize=9.5, color=INK)
+    top = 0.94 if path.shapes is None else 0.665
+    grid = figure.add_gridspec(
+        2, 1, left=0.085, right=0.985, bottom=0.125, top=top, height_ratios=(1.45, 1), hspace=0.07
+    )
+    above = figure.add_subplot(grid[0])
+    below = figure.add_subplot(grid[1], sharex=above)
+    _draw_curve(above, path, path.moment, "moment  $M\\,a/GJ$")
+    _draw_curve(below, path, path.energy, "energy  $U\\,a/GJ$")
+    above.axhline(0.0, color=QUIET, linewidth=0.6, zorder=0)
+    above.tick_params(labelbottom=False)
+    below.set_xlabel("rotation of a grip  $\\gamma/\\pi$", fontsize=9, color=INK)
+    if path.shapes is not None:
+        chosen = _snapshots(path)
+        row = figure.add_axes((0.02, 0.685, 0.96, 0.265))
+        _draw_ribbons(row, path, chosen)
+        for panel, height in ((above, path.moment), (below, path.energy)):
+            _letter(panel, path, height, chosen)
+    handles = _legend_handles(path)
+    figure.legend(
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 0.005),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=7.5,
+        handlelength=2.4,
+        columnspacing=1.6,
+        labelcolor=INK,
+    )
+    return figure
+
+
+def save_plot(path: Path, file: FilePath) -> None:
+    """Write the figure of a path, whole or not at all, in the format of the file's suffix.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is not one of FORMATS, the place cannot be written to, or there is no state.
+    """
+    suffix = File(file).suffix.lower()
+    if suffix not in FORMATS:
+        raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
+    figure = figure_of_path(path)
+    try:
+        write_whole(file, lambda opened: figure.savefig(opened, format=suffix[1:]))
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise ValueError(f"plot {str(file)!r} cannot be written: {reason}") from problem
+
+
+# --- Words -----------------------------------------------------------------------------------
+
+
+def _title(path: Path) -> str:
+    """Ring, section, mesh and mode in one line."""
+    ring = [
+        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}"
+        for name, value in path.ring.items()
+        if isinstance(value, float) and (name, value) != ("natural_curvature", 1.0)
+    ]
+    if path.ring.get("twist_axis") == "y":
+        ring.append("about y")
+    section = path.section
+    if section.get("h_over_t") is None:
+        bar = f"α = {section['alpha']:.4g}, β = {section['beta']:.4g}"
+    else:
+        bar = f"h/t = {section['h_over_t']:g}, ν = {section['nu']:g}"
+    edges = path.numerics.get("n_edges")
+    parts = [
+        " ".join([str(path.ring["shape"]), ", ".join(ring)]).strip(),
+        bar,
+        "boundary-value problem" if edges is None else f"{edges} edges",
+        f"ends at γ = {path.gamma[-1] / math.pi:.4g} π" if path.mode is None else _words(path.mode),
+    ]
+    if path.status != "done":
+        parts.append(path.status)
+    return "   |   ".join(parts)
+
+
+def _words(mode: Mode) -> str:
+    """The mode in three words or so: "folds, stable, snap-through"."""
+    words = ["folds" if mode.foldable else "does not fold"]
+    if mode.stable is not None:
+        words.append("stable" if mode.stable else "unstable")
+    if mode.stable and mode.stable_3d is False:
+        words.append("but not in 3-D")
+    words.append("no snap" if mode.snapping == "none" else mode.snapping)
+    return ", ".join(words)
+
+
+def _legend_handles(path: Path) -> list[Line2D]:
+    """One entry for every kind of line and of mark that occurs."""
+    handles = []
+    for stability, (label, colour, style) in STRETCHES.items():
+        if stability in _stability(path):
+            handles.append(Line2D([], [], color=colour, linestyle=style, label=label))
+    kinds = {point.kind for point in path.points}
+    for kind, (label, marker, size) in MARKS.items():
+        if kind in kinds:
+            handles.append(Line2D([], [], label=label, **_mark(marker, size)))
+    return handles
+
+
+def _mark(marker: str, size: float) -> dict[str, object]:
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "markersize": size,
+        "markerfacecolor": "white",
+        "markeredgecolor": INK,
+        "markeredgewidth": 0.9,
+    }
+
+
+# --- Curves ----------------------------------------------------------------------------------
+
+
+def _draw_curve(panel: Axes, path: Path, height: Array, label: str) -> None:
+    """Draw stable and unstable stretches, the states on them, and the special points."""
+    for stable, points in _stretches(path, height):
+        _, colour, style = STRETCHES[stable]
+        panel.plot(*points.T, color=colour, linestyle=style, linewidth=1.5, zorder=2)
+    panel.plot(path.gamma / math.pi, height, ".", color=INK, markersize=2.2, zorder=3)
+    for kind, (_, marker, size) in MARKS.items():
+        at = [point.position for point in path.points if point.kind == kind]
+        panel.plot(path.gamma[at] / math.pi, height[at], zorder=4, **_mark(marker, size))
+    panel.set_ylabel(label, fontsize=9, color=INK)
+    panel.margins(x=0.03, y=0.12)
+    panel.tick_params(labelsize=8, color=QUIET, labelcolor=INK, direction="in")
+    panel.spines[["top", "right"]].set_visible(False)
+    panel.spines[["left", "bottom"]].set_color(QUIET)
+    panel.yaxis.set_label_coords(-0.062, 0.5)
+
+
+def _stability(path: Path) -> list[bool | None]:
+    """Whether each interval between neighbouring states is stable; None where nothing is known.
+
+    A state of unknown index, as special points are, leaves the intervals beside it to its
+    neighbours: the style changes there.
+    """
+    known = [None if i is None else i == 0 for i in path.index.tolist()]
+    if len(known) == 1:
+        return known
+    found = [a if a is not None else b for a, b in zip(known[:-1], known[1:], strict=True)]
+    for way in (range(1, len(found)), range(len(found) - 2, -1, -1)):
+        for k in way:
+            if found[k] is None:
+                found[k] = found[k - 1 if way.step > 0 else k + 1]
+    return found
+
+
+def _stretches(path: Path, height: Array) -> Iterator[tuple[bool | None, Array]]:
+    """Yield the smooth curve (gamma/pi, height) in stretches of one stability."""
+    if len(path) == 1:
+        return
+    stability = _stability(path)
+    curve = _smooth(path, height)
+    ends = [k for k in range(1, len(stability)) if stability[k] != stability[k - 1]]
+    per = (len(curve) - 1) // len(stability)
+    for first, last in zip([0, *ends], [*ends, len(stability)], strict=True):
+        yield stability[first], curve[first * per : last * per + 1]
+
+
+def _smooth(path: Path, height: Array, per: int = 16) -> Array:
+    """Return `per` points an interval on a smooth curve (gamma/pi, height) through all states.
+
+    Monotone cubics of the chord length along (gamma, M): gamma turns back at the stored folds and M
+    at the stored limits, and nowhere else.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    values = np.column_stack([path.gamma / math.pi, height])
+    chord = _chord(path)
+    is_new = np.append(True, np.diff(chord) > 0)
+    if np.count_nonzero(is_new) == 1:
+        return np.repeat(values[:1], per * (len(path) - 1) + 1, axis=0)
+    at = np.interp(np.arange(per * (len(path) - 1) + 1) / per, np.arange(len(path)), chord)
+    curve: Array = PchipInterpolator(chord[is_new], values[is_new])(at)
+    return curve
+
+
+def _chord(path: Path) -> Array:
+    """Return the chord length along (gamma, M), each over its range, up to every state."""
+    step = [np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (path.gamma, path.moment)]
+    return np.append(0.0, np.cumsum(np.hypot(*step)))
+
+
+def _letter(panel: Axes, path: Path, height: Array, chosen: list[int]) -> None:
+    """Write each snapshot's letter beside its state, where there is most room."""
+    panel.autoscale_view()
+    to_pixels = panel.transData.transform
+    obstacles = to_pixels(_smooth(path, height))
+    low, high = panel.get_window_extent().extents.reshape(2, 2)
+    turn = np.arange(16) * math.pi / 8
+    offsets = 9.5 * np.column_stack([np.cos(turn), np.sin(turn)])  # points
+    for letter, k in zip("ABCDEF", chosen, strict=False):
+        here = np.array([path.gamma[k] / math.pi, height[k]])
+        places = to_pixels(here) + offsets * DPI / 72
+        room = np.linalg.norm(places[:, None] - obstacles, axis=2).min(axis=1)
+        room[np.any((places < low + 8) | (places > high - 8), axis=1)] = -1
+        best = int(np.argmax(room))
+        panel.annotate(
+            letter,
+            here,
+            xytext=tuple(offsets[best]),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=8.5,
+            fontweight="bold",
+            color=INK,
+            zorder=5,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
+        )
+        obstacles = np.append(obstacles, places[best : best + 1], axis=0)
+
+
+# --- Ribbons ---------------------------------------------------------------------------------
+
+
+def _snapshots(path: Path) -> list[int]:
+    """Return states spread evenly along the path, the first, the last and the peak among them."""
+    chord = _chord(path)
+    even = np.linspace(0.0, chord[-1], MOST_SNAPSHOTS)
+    chosen = [int(np.argmin(np.abs(chord - place))) for place in even]
+    peak = int(np.argmax(np.abs(path.moment)))
+    inner = range(1, MOST_SNAPSHOTS - 1)
+    nearest = min(inner, key=lambda i: abs(chord[chosen[i]] - chord[peak]))
+    if peak not in chosen:
+        chosen[nearest] = peak
+    return sorted(set(chosen))
+
+
+def _draw_ribbons(row: Axes, path: Path, chosen: list[int]) -> None:
+    """Draw the ring at the chosen states, all from one side and in one scale."""
+    assert path.shapes is not None  # noqa: S101
+    x, frames = path.shapes.x, path.shapes.frames
+    length = float(np.linalg.norm(np.diff(x[0], axis=0, append=x[0][:1]), axis=1).sum())
+    width = HALF_WIDTH * length / (2 * math.pi)
+    ribbons = [_ribbon(x[k], frames[k, :, 0], width) for k in chosen]
+    spans = np.array([np.ptp(corners.reshape(-1, 2), axis=0) for corners, _ in ribbons])
+    slot, tall = 1.12 * spans[:, 0].max(), 1.04 * spans[:, 1].max()
+    for i, (corners, colours) in enumerate(ribbons):
+        flat = corners.reshape(-1, 2)
+        centre = (flat.min(axis=0) + flat.max(axis=0)) / 2
+        placed = corners - centre + [i * slot, 0.0]
+        row.add_collection(
+            PolyCollection(list(placed), facecolors=colours, edgecolors=colours, linewidths=0.25)
+        )
+        text = f"$\\bf{{{'ABCDEF'[i]}}}$   γ = {path.gamma[chosen[i]] / math.pi:.3g} π"
+        row.text(i * slot, -tall / 2, text, ha="center", va="top", fontsize=8, color=INK)
+    row.set_xlim(-slot / 2, (len(ribbons) - 0.5) * slot)
+    row.set_ylim(-0.62 * tall, 0.5 * tall)
+    row.set_aspect("equal")
+    row.set_axis_off()
+
+
+def _ribbon(x: Array, d1: Array, width: float) -> tuple[Array, Array]:
+    """Return projected quadrilaterals (m, 4, 2), far ones first, and their colours (m, 3).
+
+    Vertex j joins edges j and j + 1; the grips sit on the middles of the edges 0 and N/2.
+    """
+    from scipy.interpolate import CubicSpline
+
+    n = len(x)
+    nodes = np.concatenate([x, d1 + np.roll(d1, -1, axis=0)], axis=1)
+    curve = CubicSpline(np.arange(n + 1), np.append(nodes, nodes[:1], axis=0), bc_type="periodic")
+    points = curve(np.arange(ACROSS + 1) * n / ACROSS - 0.5)
+    centre, across = points[:, :3], points[:, 3:]
+    across = width * across / np.linalg.norm(across, axis=1, keepdims=True)
+    lines = centre + np.multiply.outer([-1.0, -0.84, 0.84, 1.0], across)  # (4, ACROSS + 1, 3)
+    corners = np.stack([lines[:-1, :-1], lines[:-1, 1:], lines[1:, 1:], lines[1:, :-1]], axis=2)
+
+    towards, right, up = _camera()
+    normal = np.cross(np.diff(centre, axis=0), across[1:] + across[:-1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    shade = 0.55 + 0.45 * np.abs(normal @ (LIGHT / np.linalg.norm(LIGHT)))
+    colour = np.where((normal @ towards > 0)[:, None], FRONT, BACK)
+    from_grip = np.abs((np.arange(ACROSS) + 0.5 + ACROSS / 4) % (ACROSS / 2) - ACROSS / 4)
+    colour = np.where((from_grip < ACROSS / 80)[:, None], GRIP, colour) * shade[:, None]
+    colours = np.stack([0.55 * colour, colour, 0.55 * colour])  # darker along the two rims
+
+    corners, colours = corners.reshape(-1, 4, 3), colours.reshape(-1, 3)
+    order = np.argsort(corners.mean(axis=1) @ towards)
+    return (corners @ np.stack([right, up], axis=1))[order], colours[order]
+
+
+def _camera() -> tuple[Array, Array, Array]:
+    """Return the directions to the camera, to its right and up; the twisting axis is upright."""
+    towards = CAMERA / np.linalg.norm(CAMERA)
+    right = np.cross([0.0, 0.0, 1.0], towards)
+    right /= np.linalg.norm(right)
+    return towards, right, np.cross(towards, right)

@@ -1,0 +1,154 @@
+"""Rods, states and small numerics that the physics tests share."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from der.assembly import assemble
+from der.equilibrium import (
+    ADVICE,
+    Control,
+    Direction,
+    Equilibrium,
+    equilibrium,
+    moved,
+)
+from der.frames import Array, rotation, turned_all
+from der.linking import unfold
+from der.rod import Rod, State, rod
+from der.sector import Sector
+from der.supports import Supports
+
+E1, E2, E3 = np.eye(3)
+MEASURES = ("logarithm", "angle", "tangent")
+
+
+# --- rods and states ------------------------------------------------------------------------
+
+
+def turned_about(axis: int, angle: Array | float) -> Array:
+    """Quaternions (..., 4) of rotations by ``angle`` about the basis vector ``axis`` (1, 2, 3)."""
+    half = 0.5 * np.asarray(angle, dtype=float)
+    q = np.zeros((*half.shape, 4))
+    q[..., 0], q[..., axis] = np.cos(half), np.sin(half)
+    return q
+
+
+def turned_rigidly(quat: Array, w: Array) -> Array:
+    """Frames ``quat`` (n, 4), all turned by the rotation vector ``w`` (3,) in the global basis."""
+    return turned_all(quat, w @ rotation(quat))
+
+
+def unloaded(body: Rod, quat: Array, conditions: int, load: float = 0.0) -> State:
+    """State with the given frames, no stretch and no forces yet."""
+    return State(quat, np.zeros(body.n_edges), np.zeros(conditions), load)
+
+
+def straight(n_cells: int, stiffness: tuple[float, float, float], **options: object) -> Rod:
+    """Open, naturally straight rod of length 1."""
+    return rod(np.full(n_cells, 1 / n_cells), np.zeros(n_cells), stiffness, **options)
+
+
+def covered_circle(n: int, kappa0: float, stiffness: tuple[float, float, float], n_edges: int):
+    """Closed rod of length 2 pi and natural curvature ``kappa0``, and its n-covered circle."""
+    cell = np.full(n_edges, 2 * np.pi / n_edges)
+    body = rod(cell, kappa0 * cell, stiffness, closed=True)
+    return body, unloaded(body, turned_about(1, n * cell[0] * np.arange(n_edges)), 3)
+
+
+def solved(body: Rod, held: Supports, start: State, **options: object) -> Equilibrium:
+    """The equilibrium from ``start``; a failed solve fails the test."""
+    found = equilibrium(body, held, start, **options)
+    assert found.converged, ADVICE[found.outcome]
+    return found
+
+
+def walk(piece: Sector, length: float, stop: Callable[[Equilibrium], bool]) -> Iterator[Equilibrium]:
+    """States on the path from the flat ring, about ``length`` apart, until ``stop`` says so."""
+    here = solved(piece.body, piece.held, piece.start)
+    while True:
+        yield here
+        if stop(here):
+            return
+        ahead, t = length, here.tangent
+        while True:
+            step = Direction(t.q * ahead, t.force * ahead, t.load * ahead)
+            there = equilibrium(
+                piece.body,
+                piece.held,
+                moved(piece.held, here.state, step),
+                along=t,
+                control=Control.DIRECTION,
+            )
+            if there.converged:
+                break
+            ahead *= 0.5
+            assert ahead > 1e-6, ADVICE[there.outcome]
+        here = there
+
+
+def lifted(piece: Sector, state: State, onto: Sector) -> Equilibrium:
+    """A quarter's state as an equilibrium of a half or of the full ring, solved at its load."""
+    quat = unfold(state.quat, piece.copies)[: onto.body.n_edges]
+    start = unloaded(onto.body, quat, len(onto.held.target), state.load)
+    return solved(onto.body, onto.held, start)
+
+
+def three_covered(piece: Sector) -> State:
+    """The folded circle, gamma = pi, on a quarter: curvature 3 from the turned grip on."""
+    s = piece.arc_length
+    grip = turned_rigidly(piece.start.quat[-1:], -np.pi * E3)
+    quat = turned_all(np.repeat(grip, len(s), axis=0), 3 * np.outer(s - s[-1], E1))
+    return piece.start.but(quat=quat, load=np.pi)
+
+
+# --- numerics -------------------------------------------------------------------------------
+
+
+def richardson(*values: float) -> float:
+    """Limit of ``values`` from meshes refined by 2 each time, errors in even powers of the cell."""
+    row = list(values)
+    for order in range(2, 2 * len(values), 2):
+        row = [b + (b - a) / (2**order - 1) for a, b in zip(row, row[1:], strict=False)]
+    return row[0]
+
+
+def first_change(index: Callable[[float], int], low: float, high: float) -> float:
+    """Where ``index`` leaves its value at ``low``, bracketed by bisection to 1e-11."""
+    there = index(low)
+    assert index(high) != there, f"index {there} at both ends"
+    while abs(high - low) > 1e-11 * (1 + abs(high)):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if index(middle) == there else (low, middle)
+    return 0.5 * (low + high)
+
+
+def dense(body: Rod, held: Supports, state: State, *, load_free: bool = False):
+    """Hessian of the Lagrangian (N, N) in the unknowns that move, and their conditions (N, n_c).
+
+    With ``load_free`` the load is one more unknown, the last.
+    """
+    system = assemble(body, held, state.quat, state.stretch, state.force, state.load)
+    n, b = held.free.shape
+    hess = np.zeros((n, b, n, b))
+    for j in range(n):
+        hess[j, :, j] += system.diag[j]
+    for s in range(len(body.cell)):
+        c = (s + 1) % n
+        hess[s, :, c] += system.off[s]
+        hess[c, :, s] += system.off[s].T
+    keep = held.free.ravel()
+    hess = hess.reshape(n * b, n * b)[np.ix_(keep, keep)]
+    border = system.border.reshape(n * b, -1)[keep]
+    if load_free:
+        column = system.load_column.ravel()[keep]
+        hess = np.block([[hess, column[:, None]], [column[None, :], system.load_hess]])
+        border = np.vstack([border, system.load_border])
+    return hess, border
+
+
+def on_conditions(hess: Array, border: Array) -> Array:
+    """Eigenvalues of ``hess`` on the null space of ``border``.T, ascending."""
+    q, _ = np.linalg.qr(border, mode="complete")
+    z = q[:, border.shape[1] :]
+    return np.linalg.eigvalsh(z.T @ hess @ z)
