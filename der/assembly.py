@@ -84,7 +84,8 @@ def assemble(rod, held, quat, stretch, force, load):
     gap = np.zeros(n_c)
     border = np.zeros((n, b, n_c))
     position_rows(rod.length, held.weight, held.axis, quat, stretch, gap, border)
-    gap -= held.target
+    for k in range(n_c):
+        gap[k] -= held.target[k]
     column = np.zeros((n, b))
     load_border = np.zeros(n_c)
     load_grad, load_hess, energy, noise = 0.0, 0.0, 0.0, 0.0
@@ -242,5 +243,6 @@ def take_out(free, diag, off, border):
                 if j > 0:
                     off[j - 1, k, i] = 0.0
             diag[j, i, i] = 1.0
-            border[j, i, :] = 0.0
+            for k in range(border.shape[2]):
+                border[j, i, k] = 0.0
     return diag, off, border

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 MAX_DELAYED = 8
 
 _DELAY_BELOW = 1e-4  # relative size below which a pivot is delayed: growth stays under its inverse
+_NO_STIFFNESS = 1e-10  # of the largest entry: an unknown without stiffness of its own
 _BUNCH_PARLETT = 0.6403882032022076  # (1 + sqrt 17)/8, Bunch & Parlett 1971
 
 
@@ -52,8 +53,8 @@ def invert(A, delay_below, out_delayed):
     """Replace the symmetric ``A`` (m, m) by -A^-1, by sweeps with complete pivoting.
 
     Pivots are single entries or pairs (Bunch & Parlett), so an indefinite ``A`` is safe. When all
-    that is left is below ``delay_below``, the largest diagonal entry k left is raised to the size of
-    the matrix, and ``out_delayed[k]`` says by how much; with ``delay_below`` = 0 nothing is added.
+    that is left is below ``delay_below``, 1 is added to the largest diagonal entry k left, and
+    ``out_delayed[k]`` says so; with ``delay_below`` = 0 nothing is added.
 
     Returns (number of negative pivots, smallest |pivot|); a zero pivot ends with (count, 0).
     """
@@ -75,8 +76,8 @@ def invert(A, delay_below, out_delayed):
         if max(on, off) <= delay_below:
             if delay_below == 0.0:
                 return negative, 0.0
-            out_delayed[k] = delay_below / _DELAY_BELOW
-            A[k, k] += out_delayed[k]
+            out_delayed[k] = 1.0
+            A[k, k] += 1.0
             on, off = abs(A[k, k]), 0.0
         if on >= _BUNCH_PARLETT * off:
             d = A[k, k]
@@ -144,13 +145,20 @@ def factor(diag, off, border):
     pivot = np.empty((b, b))
     count = 0
     negative = 0
-    whole = max(np.max(np.abs(diag)), np.max(np.abs(off))) if n > 0 else 0.0
+    unit = np.empty(b)  # square root of an unknown's own stiffness: pivots are judged by it
+    whole = 0.0
     for j in range(n):
-        size = 1e-3 * whole  # a block may be zero by itself
+        for k in range(b):
+            whole = max(whole, abs(diag[j, k, k]))
+            for i in range(b):
+                if j < n - 1:
+                    whole = max(whole, abs(off[j, k, i]))
+    for j in range(n):
         for k in range(b):
             for i in range(b):
                 pivot[k, i] = diag[j, k, i]
-                size = max(size, abs(pivot[k, i]))
+            own = abs(diag[j, k, k])
+            unit[k] = np.sqrt(own if own > _NO_STIFFNESS * whole else whole)
         if j > 0:
             for k in range(b):
                 for i in range(b):
@@ -165,14 +173,18 @@ def factor(diag, off, border):
                         s -= lower[j, k, r] * off[j - 1, r, i]
                     pivot[k, i] = s
                     pivot[i, k] = s
-        minus, _ = invert(pivot, _DELAY_BELOW * size, delayed)
+        for k in range(b):
+            for i in range(b):
+                pivot[k, i] /= unit[k] * unit[i]
+        minus, _ = invert(pivot, _DELAY_BELOW, delayed)
         negative += minus
         for k in range(b):
             for i in range(b):
-                inverse[j, k, i] = -pivot[k, i]
+                inverse[j, k, i] = -pivot[k, i] / (unit[k] * unit[i])
             if delayed[k] != 0.0:
                 if count < MAX_DELAYED:
-                    where[count, 0], where[count, 1], added[count] = j, k, delayed[k]
+                    where[count, 0], where[count, 1] = j, k
+                    added[count] = delayed[k] * unit[k] ** 2
                 count += 1
                 delayed[k] = 0.0
     if count > MAX_DELAYED:
@@ -180,7 +192,10 @@ def factor(diag, off, border):
 
     M = m + count
     wide = np.zeros((n, b, M))
-    wide[:, :, :m] = border
+    for j in range(n):
+        for k in range(b):
+            for p in range(m):
+                wide[j, k, p] = border[j, k, p]
     for d in range(count):
         wide[where[d, 0], where[d, 1], m + d] = 1.0
     lifted = wide.copy()
@@ -314,14 +329,17 @@ def solve_augmented(factors, m, column, column_border, row, row_border, corner, 
     solve_band(factors.inverse, factors.lower, Y)
     A = np.zeros((M + 1, M + 1))
     rhs = np.zeros((M + 1, r))
-    A[:M, :M] = factors.schur
+    for p in range(M):
+        for q in range(M):
+            A[p, q] = factors.schur[p, q]
     for p in range(m):
         A[p, M] = column_border[p]
         A[M, p] = row_border[p]
         for c in range(r):
             rhs[p, c] = y[p, c]
     A[M, M] = corner
-    rhs[M] = z
+    for c in range(r):
+        rhs[M, c] = z[c]
     for j in range(n):
         for k in range(b):
             for p in range(M):
@@ -354,22 +372,92 @@ def solve_augmented(factors, m, column, column_border, row, row_border, corner, 
 
 
 @njit(cache=True)
-def multiply(diag, off, border, x, y, out_x, out_y):
-    """K times (x, y): ``out_x`` (n, b, r) and ``out_y`` (m, r)."""
+def solve_refined(diag, off, factors, m, column, column_border, row, row_border, corner, x, y, z):
+    """`solve_augmented` with its residual checked, and refined once where that is not tiny.
+
+    ``diag`` and ``off`` are the blocks that were factored. Returns False where the matrix is
+    singular, or where refinement leaves a residual above 1e-6 of the right-hand side and of the
+    terms that should cancel in it: the caller must not use such a solution.
+    """
+    r = x.shape[2]
+    wanted_x, wanted_y, wanted_z = x.copy(), y.copy(), z.copy()
+    if not solve_augmented(factors, m, column, column_border, row, row_border, corner, x, y, z):
+        return False
+    rx, ry, rz = wanted_x.copy(), wanted_y.copy(), wanted_z.copy()
+    border = factors.border
+    error = _subtract(
+        diag, off, border, column, column_border, row, row_border, corner, x, y, z, rx, ry, rz
+    )
+    if error < 1e-12:
+        return True
+    if not solve_augmented(factors, m, column, column_border, row, row_border, corner, rx, ry, rz):
+        return False
+    for c in range(r):
+        for j in range(x.shape[0]):
+            for k in range(x.shape[1]):
+                x[j, k, c] += rx[j, k, c]
+        for p in range(m):
+            y[p, c] += ry[p, c]
+        z[c] += rz[c]
+    error = _subtract(
+        diag,
+        off,
+        border,
+        column,
+        column_border,
+        row,
+        row_border,
+        corner,
+        x,
+        y,
+        z,
+        wanted_x,
+        wanted_y,
+        wanted_z,
+    )
+    return error < 1e-6
+
+
+@njit(cache=True)
+def _subtract(
+    diag, off, border, column, column_border, row, row_border, corner, x, y, z, out_x, out_y, out_z
+):
+    """Subtract the augmented matrix times (x, y, z) from ``out``.
+
+    Returns the largest entry left over the largest term that went into it.
+    """
     n, b, r = x.shape
-    m = border.shape[2]
-    out_x[:] = 0.0
-    out_y[:] = 0.0
-    for j in range(n):
-        for k in range(b):
-            for i in range(b):
-                for c in range(r):
-                    out_x[j, k, c] += diag[j, k, i] * x[j, i, c]
+    m = y.shape[0]
+    size, left = 1e-300, 0.0
+    for c in range(r):
+        sums = np.zeros(m)
+        last = corner * z[c]
+        for p in range(m):
+            sums[p] = column_border[p] * z[c]
+            last += row_border[p] * y[p, c]
+        for j in range(n):
+            for k in range(b):
+                s = column[j, k] * z[c]
+                size = max(size, abs(s), abs(out_x[j, k, c]))
+                for i in range(b):
+                    term = diag[j, k, i] * x[j, i, c]
+                    s += term
+                    size = max(size, abs(term))
                     if j + 1 < n:
-                        out_x[j, k, c] += off[j, k, i] * x[j + 1, i, c]
+                        s += off[j, k, i] * x[j + 1, i, c]
                     if j > 0:
-                        out_x[j, k, c] += off[j - 1, i, k] * x[j - 1, i, c]
-            for p in range(m):
-                for c in range(r):
-                    out_x[j, k, c] += border[j, k, p] * y[p, c]
-                    out_y[p, c] += border[j, k, p] * x[j, k, c]
+                        s += off[j - 1, i, k] * x[j - 1, i, c]
+                for p in range(m):
+                    s += border[j, k, p] * y[p, c]
+                    sums[p] += border[j, k, p] * x[j, k, c]
+                last += row[j, k] * x[j, k, c]
+                out_x[j, k, c] -= s
+                left = max(left, abs(out_x[j, k, c]))
+        for p in range(m):
+            size = max(size, abs(out_y[p, c]))
+            out_y[p, c] -= sums[p]
+            left = max(left, abs(out_y[p, c]))
+        size = max(size, abs(out_z[c]))
+        out_z[c] -= last
+        left = max(left, abs(out_z[c]))
+    return left / size

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from der.assembly import assemble, take_out
-from der.block_ldl import factor, inertia, solve_augmented
+from der.block_ldl import factor, inertia, solve_refined
 from der.frames import Array, into_frame, turned
 from der.rod import Rod, State
 from der.supports import Supports
@@ -111,34 +111,18 @@ class Equilibrium:
 def _correct(
     rod, held, quat, stretch, force, load, control, row, row_load, moment, tolerance, most
 ):
+    """Newton's method; ``row`` (n, b) and ``row_load`` are the mass-weighted direction."""
     n, b = held.free.shape
     n_c = held.target.shape[0]
-    quat = quat.copy()
-    stretch = stretch.copy()
-    force = force.copy()
-    x = np.zeros((n, b, 1))
-    y = np.zeros((n_c, 1))
-    z = np.zeros(1)
-    axis = np.empty(3)
-    no_row = np.zeros((n, b))
-    no_border = np.zeros(n_c)
-    first = 0.0
-    outcome = 1
-    iteration = 0
-    index, margin, residual = -1, 0.0, np.inf
-    system = assemble(rod, held, quat, stretch, force, load)
+    quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
+    x, y, z = np.zeros((n, b, 1)), np.zeros((n_c, 1)), np.zeros(1)
+    no_row, no_border = np.zeros((n, b)), np.zeros(n_c)
+    negative, margin, moment_rate, first = -1, 0.0, 0.0, 0.0
+    outcome, iteration = 1, 0
     while True:
-        residual = 0.0
-        for j in range(n):
-            for i in range(b):
-                if held.free[j, i]:
-                    residual = max(residual, abs(system.grad[j, i]))
-        for k in range(n_c):
-            residual = max(residual, abs(system.gap[k]))
-        if control == 2:
-            residual = max(residual, abs(system.load_grad - moment))
-        if iteration == 0:
-            first = residual
+        system = assemble(rod, held, quat, stretch, force, load)
+        residual = _residual(held, system, control, moment)
+        first = residual if iteration == 0 else first
         if not np.isfinite(residual) or (iteration > 1 and residual > 1e3 * max(first, 1.0)):
             outcome = 2
             break
@@ -149,52 +133,51 @@ def _correct(
         if not done and iteration >= most:
             break
         diag, off, border = take_out(held.free, system.diag, system.off, system.border)
-        column = np.where(held.free, system.load_column, 0.0)
-        factors = factor(diag, off, border)
-        if done:
-            # the tangent: K (q, force) + load column = 0, normalised along the given direction
-            index, margin = inertia(factors)
-            x[:] = 0.0
-            y[:] = 0.0
-            z[0] = 1.0
-            solved = solve_augmented(
-                factors, n_c, column, system.load_border, row, no_border, row_load, x, y, z
-            )
-            outcome = 0 if solved else 4
-            break
+        column = system.load_column
         for j in range(n):
             for i in range(b):
-                x[j, i, 0] = -system.grad[j, i] if held.free[j, i] else 0.0
+                x[j, i, 0] = -system.grad[j, i]
+                if not held.free[j, i]:
+                    x[j, i, 0] = 0.0
+                    column[j, i] = 0.0
         for k in range(n_c):
             y[k, 0] = -system.gap[k]
         z[0] = 0.0
-        if control == 0:
-            solved = solve_augmented(
-                factors, n_c, column, system.load_border, no_row, no_border, 1.0, x, y, z
-            )
-        elif control == 1:
-            solved = solve_augmented(
-                factors, n_c, column, system.load_border, row, no_border, row_load, x, y, z
-            )
-        else:
+        factors = factor(diag, off, border)
+        # the closing row: of the direction for the tangent, else that of the control
+        last, last_border, corner = row, no_border, row_load
+        if done:
+            negative, margin = inertia(factors)
+            x, y = np.zeros((n, b, 1)), np.zeros((n_c, 1))
+            z[0] = 1.0
+        elif control == 0:
+            last, corner = no_row, 1.0
+        elif control == 2:
+            last, last_border, corner = column, system.load_border, system.load_hess
             z[0] = moment - system.load_grad
-            solved = solve_augmented(
-                factors,
-                n_c,
-                column,
-                system.load_border,
-                column,
-                system.load_border,
-                system.load_hess,
-                x,
-                y,
-                z,
-            )
-        if control == 0:
-            z[0] = 0.0  # the load is given: not even rounding moves it
+        solved = factors.negative >= 0 and solve_refined(
+            diag,
+            off,
+            factors,
+            n_c,
+            column,
+            system.load_border,
+            last,
+            last_border,
+            corner,
+            x,
+            y,
+            z,
+        )
         if not solved:
             outcome = 4
             break
+        if done:
+            moment_rate = _normalise(rod, system, column, x, y, z)
+            outcome = 0
+            break
+        if control == 0:
+            z[0] = 0.0  # the load is given: not even rounding moves it
         largest = abs(z[0])
         for j in range(n):
             for i in range(3):
@@ -202,29 +185,9 @@ def _correct(
         if not largest < _LARGEST_TURN:
             outcome = 2
             break
-        _move(held, quat, stretch, force, x[:, :, 0], y[:, 0], z[0], axis)
+        _move(held, quat, stretch, force, x, y, z[0])
         load += z[0]
         iteration += 1
-        system = assemble(rod, held, quat, stretch, force, load)
-
-    rate = Direction(x[:, :, 0].copy(), y[:, 0].copy(), z[0])
-    moment_rate = 0.0
-    if outcome == 0:
-        norm = 0.0
-        total = 0.0
-        for j in range(n):
-            total += rod.length[j]
-            for i in range(b):
-                norm += rod.length[j] * rate.q[j, i] ** 2
-        norm = np.sqrt(norm / total + rate.load**2)
-        rate = Direction(rate.q / norm, rate.force / norm, rate.load / norm)
-        moment_rate = system.load_hess * rate.load
-        for j in range(n):
-            for i in range(b):
-                if held.free[j, i]:
-                    moment_rate += system.load_column[j, i] * rate.q[j, i]
-        for k in range(n_c):
-            moment_rate += system.load_border[k] * rate.force[k]
     return Correction(
         outcome,
         system.bent_too_far,
@@ -236,34 +199,73 @@ def _correct(
         load,
         system.energy,
         system.load_grad,
-        rate.q,
-        rate.force,
-        rate.load,
+        x,
+        y,
+        z[0],
         moment_rate,
-        index,
+        negative,
         margin,
     )
 
 
 @njit(cache=True)
-def _move(held, quat, stretch, force, dq, dforce, dload, axis):
-    """Add an increment to ``quat``, ``stretch`` and ``force`` in place; ``axis`` (3,) is scratch.
+def _residual(held, system, control, moment):
+    """Largest entry of the gradient that is free to vanish, of the position gaps and the moment."""
+    largest = 0.0
+    n, b = held.free.shape
+    for j in range(n):
+        for i in range(b):
+            if held.free[j, i] and not abs(system.grad[j, i]) <= largest:  # true for NaN, too
+                largest = abs(system.grad[j, i])
+    for gap in system.gap:
+        largest = max(largest, abs(gap))
+    if control == 2:
+        largest = max(largest, abs(system.load_grad - moment))
+    return largest
+
+
+@njit(cache=True)
+def _normalise(rod, system, column, x, y, z):
+    """Scale a tangent in place to unit mass-weighted norm; returns d(dL/dload) along it."""
+    n, b, _ = x.shape
+    total, norm = 0.0, 0.0
+    for j in range(n):
+        total += rod.length[j]
+        for i in range(b):
+            norm += rod.length[j] * x[j, i, 0] ** 2
+    scale = 1.0 / np.sqrt(norm / total + z[0] * z[0])
+    z[0] *= scale
+    rate = system.load_hess * z[0]
+    for j in range(n):
+        for i in range(b):
+            x[j, i, 0] *= scale
+            rate += column[j, i] * x[j, i, 0]
+    for k in range(y.shape[0]):
+        y[k, 0] *= scale
+        rate += system.load_border[k] * y[k, 0]
+    return rate
+
+
+@njit(cache=True)
+def _move(held, quat, stretch, force, dq, dforce, dload):
+    """Add an increment ``dq`` (n, b, 1), ``dforce`` (n_c, 1) to the other arrays, in place.
 
     The frames that turn with the load turn about a fixed axis, so theirs is exact at any angle.
     """
-    n, b = dq.shape
+    n, b, _ = dq.shape
+    axis = np.empty(3)
     for j in range(n):
         for i in range(3):
-            axis[i] = dq[j, i]
+            axis[i] = dq[j, i, 0]
         if held.turn[j] != 0.0:
             into_frame(quat[j], held.turn_axis, axis)
             for i in range(3):
                 axis[i] *= held.turn[j] * dload
         turned(quat[j], axis, quat[j])
         if b == 4:
-            stretch[j] += dq[j, 3]
+            stretch[j] += dq[j, 3, 0]
     for k in range(force.shape[0]):
-        force[k] += dforce[k]
+        force[k] += dforce[k, 0]
 
 
 def weights(body: Rod) -> Array:
@@ -279,7 +281,7 @@ def dot(mass: Array, a: Direction, b: Direction) -> float:
 def moved(held: Supports, state: State, step: Direction) -> State:
     """``state`` moved by the increment ``step``."""
     quat, stretch, force = state.quat.copy(), state.stretch.copy(), state.force.copy()
-    _move(held, quat, stretch, force, step.q, step.force, step.load, np.empty(3))
+    _move(held, quat, stretch, force, step.q[:, :, None], step.force[:, None], step.load)
     return State(quat, stretch, force, state.load + step.load)
 
 
@@ -317,7 +319,7 @@ def equilibrium(
         start.quat,
         start.stretch,
         start.force,
-        start.load,
+        float(start.load),
         int(control),
         row,
         row_load,
@@ -333,7 +335,7 @@ def equilibrium(
         c.residual,
         c.energy,
         c.moment,
-        Direction(c.q_rate, c.force_rate, c.load_rate),
+        Direction(c.q_rate[:, :, 0], c.force_rate[:, 0], c.load_rate),
         c.moment_rate,
         c.negative,
         c.margin,

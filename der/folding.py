@@ -11,8 +11,9 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from der.assembly import assemble
+from der.checks import counts
 from der.path import Stuck, Tally, Visit, Wanted, follow, three_covered
-from der.record import AtPi, Path, Point, Shapes, Timing, counts, folding_mode
+from der.record import AtPi, Path, Point, Shapes, Timing, folding_mode
 from der.rod import State
 from der.scene import Scene
 from der.sector import Sector, free_ring, sector
@@ -150,8 +151,8 @@ def _record(
         gamma=np.array([visit.at.state.load for visit in visits]),
         moment=moments,
         energy=np.array([piece.copies * visit.at.energy for visit in visits]),
-        index=counts(indices),
-        index_moment=counts([_moment_index(v, i) for v, i in zip(visits, indices, strict=True)]),
+        index=counts("index", indices),
+        index_moment=counts("index_moment", list(map(_moment_index, visits, indices))),
         points=points,
         at_pi=at_pi,
         mode=mode,

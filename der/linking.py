@@ -84,7 +84,9 @@ def unfold(quat, copies):
     arm = n if copies == 2 else 2 * n - 1
     out = np.empty((2 * arm - 2, 4))
     shift = arm - n
-    out[shift:arm] = quat
+    for j in range(n):
+        for i in range(4):
+            out[shift + j, i] = quat[j, i]
     for j in range(shift):
         q = quat[shift - j]
         out[j, 0], out[j, 1], out[j, 2], out[j, 3] = -q[0], q[1], -q[2], q[3]
@@ -96,7 +98,7 @@ def unfold(quat, copies):
 
 @njit(cache=True)
 def unfold_lengths(length, copies):
-    """Edge lengths (N,) of the whole ring from those (n,) of a sector, whose ends are half edges."""
+    """Edge lengths (N,) of the whole ring from those (n,) of a sector, which ends in half edges."""
     n = length.shape[0]
     if copies == 1:
         return length.copy()

@@ -407,9 +407,11 @@ def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark])
     known: list[_Mark] = []
     for m in line:
         if m.visit.kind == "fold":
-            for s in (m.s - flank, m.s + flank):
-                if 0.0 < s < line[-1].s:
-                    known.append(_Mark(s, _visit(piece, wanted, step.at(s)), shown=False))
+            known += [
+                _Mark(s, _visit(piece, wanted, step.at(s)), shown=False)
+                for s in (m.s - flank, m.s + flank)
+                if 0.0 < s < line[-1].s
+            ]
         else:
             known.append(m)
     known = [m for m in known if m.visit.index is not None and None not in m.visit.index]
@@ -419,8 +421,9 @@ def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark])
     for a, b in pairwise(known):
         if any(a.s < s < b.s for s in folds):
             continue
-        assert a.visit.index is not None and b.visit.index is not None  # noqa: S101
-        for c, (before, after) in enumerate(zip(a.visit.index, b.visit.index, strict=True)):
+        for c, (before, after) in enumerate(
+            zip(a.visit.index or (), b.visit.index or (), strict=True)
+        ):
             found += _branches(piece, step, c, (a.s, before), (b.s, after))
     return sorted([*line, *(m for m in known if not m.shown), *found], key=lambda m: m.s)
 
@@ -456,14 +459,16 @@ def _passages(
     if line[0].visit.link is None:
         line[0] = replace(line[0], visit=replace(line[0].visit, link=piece.link(step.start.state)))
     end = replace(last, visit=replace(last.visit, link=piece.link(last.visit.at.state)))
-    before, after = line[0].visit.link, end.visit.link
-    assert before is not None and after is not None  # noqa: S101
-    found = _contacts(piece, wanted, step, (line[0].s, before), (end.s, after))
+    found = _contacts(piece, wanted, step, (line[0].s, line[0].visit.link), (end.s, end.visit.link))
     return sorted([*line[:-1], end, *found], key=lambda m: m.s)
 
 
 def _contacts(
-    piece: Sector, wanted: Wanted, step: Step, low: tuple[float, int], high: tuple[float, int]
+    piece: Sector,
+    wanted: Wanted,
+    step: Step,
+    low: tuple[float, int | None],
+    high: tuple[float, int | None],
 ) -> list[_Mark]:
     """Where the link changes between two places, by bisection."""
     if low[1] == high[1]:

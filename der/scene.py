@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 
+from der.checks import checked_number, one_of, positive
 from der.ring import Ring
 from der.sections import Section
 
@@ -72,13 +73,13 @@ class Scene:
                 f"got {self.section!r}"
             )
         sector_name(self.ring, self.sector, self.n_edges)
-        _one_of("curvature", self.curvature, MEASURES)
-        _one_of("stretch", self.stretch, STRETCH)
+        one_of("curvature", self.curvature, MEASURES)
+        one_of("stretch", self.stretch, STRETCH)
         if self.until is not None:
-            _one_of("until", self.until, ("folded",))
-        _positive("gamma_max", self.gamma_max)
-        _positive("a_over_t", self.a_over_t)
-        _positive("tolerance", self.tolerance)
+            one_of("until", self.until, ("folded",))
+        positive("gamma_max", self.gamma_max)
+        positive("a_over_t", self.a_over_t)
+        positive("tolerance", self.tolerance)
         if self.tolerance > 1e-4:
             raise ValueError(f"tolerance must be at most 1e-4, got {self.tolerance!r}")
         if self.save_at is not None:
@@ -86,11 +87,12 @@ class Scene:
 
     def _check_save_at(self, values: Sequence[float]) -> None:
         last = math.inf if self.until == "folded" else self.gamma_max
-        for gamma in values:
-            if not (_is_number(gamma) and 0.0 <= gamma <= last):
-                allowed = "at least 0" if last == math.inf else f"between 0 and gamma_max = {last}"
-                raise ValueError(f"save_at must hold finite numbers {allowed}, got {gamma!r}")
-        object.__setattr__(self, "save_at", tuple(sorted({float(gamma) for gamma in values})))
+        allowed = "numbers >= 0" if last == math.inf else f"numbers from 0 to gamma_max = {last}"
+        gammas = {
+            checked_number("save_at", gamma, allowed, lambda g: 0.0 <= g <= last)
+            for gamma in values
+        }
+        object.__setattr__(self, "save_at", tuple(sorted(gammas)))
 
     @property
     def stretching(self) -> float:
@@ -111,7 +113,7 @@ def sector_name(ring: Ring, name: str, n_edges: int) -> str:
     ValueError
         Naming the argument, its value and what is allowed.
     """
-    _one_of("sector", name, ("auto", *COPIES))
+    one_of("sector", name, ("auto", *COPIES))
     if isinstance(n_edges, bool) or not isinstance(n_edges, int):
         raise ValueError(f"n_edges must be a whole number, got {n_edges!r}")
     if name == "auto":
@@ -125,17 +127,3 @@ def sector_name(ring: Ring, name: str, n_edges: int) -> str:
             f" for the sector {name!r}, got {n_edges}"
         )
     return name
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _positive(name: str, value: object) -> None:
-    if not _is_number(value) or value <= 0:  # type: ignore[operator]
-        raise ValueError(f"{name} must be a finite number > 0, got {value!r}")
-
-
-def _one_of(name: str, value: object, allowed: Sequence[str]) -> None:
-    if value not in allowed:
-        raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")

@@ -106,7 +106,7 @@ def sector(
         "half": (0, n_edges // 2),
         "quarter": (n_edges // 4, n_edges // 2),
     }[name]
-    s = step * np.arange(first, last + 1)
+    s: Array = step * np.arange(first, last + 1, dtype=float)
     closed = name == "full"
     joints = np.append(s, ring.length) if closed else s
     body = rod(

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from der.assembly import assemble, position_rows, take_out
-from der.block_ldl import factor, inertia, solve_augmented
+from der.block_ldl import factor, inertia, solve_refined
 from der.frames import Array
 from der.rod import Rod, State
 from der.supports import Supports
@@ -89,11 +89,14 @@ def _solve_class(rod, held, modes, quat, stretch, force, load, x):
     m = modes.axis.shape[0]
     none, no_row = np.zeros(m), np.zeros((n, b))
     factors = factor(diag, off, border)
-    solve_augmented(factors, m, no_row, none, no_row, none, 1.0, x, np.zeros((m, r)), np.zeros(r))
+    solve_refined(
+        diag, off, factors, m, no_row, none, no_row, none, 1.0, x, np.zeros((m, r)), np.zeros(r)
+    )
     for j in range(n):
         for i in range(b):
             if not modes.free[j, i]:
-                x[j, i, :] = 0.0
+                for k in range(r):
+                    x[j, i, k] = 0.0
 
 
 def softest_modes(
@@ -111,22 +114,17 @@ def softest_modes(
     """
     n, b = modes.free.shape
     size = min(count + 2, int(modes.free.sum()) - len(modes.axis))
-    mass = np.repeat(body.length, b)
-    z = np.random.default_rng(0).normal(size=(n * b, size)) * modes.free.reshape(-1, 1)
-    values = np.zeros(size)
+    root = np.sqrt(np.repeat(body.length, b))[:, None]
+    start = np.random.default_rng(0).normal(size=(n * b, size)) * modes.free.reshape(-1, 1)
+    z, _ = np.linalg.qr(start)  # modes times sqrt(M), orthonormal
+    compliance = np.zeros(size)
     for _ in range(30):
-        y = np.ascontiguousarray((mass[:, None] * z).reshape(n, b, size))
+        y = np.ascontiguousarray((root * z).reshape(n, b, size))
         _solve_class(body, held, modes, state.quat, state.stretch, state.force, state.load, y)
-        y = y.reshape(n * b, size)
-        scale = np.sqrt(np.einsum("ij,i,ij->j", y, mass, y))
-        y, z = y / scale, z / scale
-        # K y = M z on the conditions, so y'My and y'Mz make the projected problem
-        inner = y.T @ (mass[:, None] * y)
-        left = np.linalg.cholesky(inner)
-        inverse = np.linalg.inv(left)
-        projected = inverse @ (y.T @ (mass[:, None] * z)) @ inverse.T
-        values, turn = np.linalg.eigh(0.5 * (projected + projected.T))
-        order = np.argsort(np.abs(values))
-        values = values[order]
-        z = y @ inverse.T @ turn[:, order]
-    return values[:count], z.T[:count].reshape(count, n, b)
+        y = root * y.reshape(n * b, size)
+        projected = z.T @ y
+        compliance, turn = np.linalg.eigh(0.5 * (projected + projected.T))
+        order = np.argsort(-np.abs(compliance))
+        compliance = compliance[order]
+        z, _ = np.linalg.qr(y @ turn[:, order])
+    return 1.0 / compliance[:count], (z / root).T[:count].reshape(count, n, b)

@@ -4,7 +4,8 @@ The two edges that meet at a vertex differ by a relative rotation p = conj(qa) o
 symmetrically, half the twist, then the turn of the tangent, then the other half of the twist, it
 reads (Euler angles about d3, bend, d3)
 
-    p0 = cos(phi/2) cos(tau/2),  p3 = cos(phi/2) sin(tau/2),  (p1, p2) = sin(phi/2) (cos psi, sin psi)
+    p0 = cos(phi/2) cos(tau/2),   p1 = sin(phi/2) cos(psi),
+    p3 = cos(phi/2) sin(tau/2),   p2 = sin(phi/2) sin(psi)
 
 with phi the turning angle of the tangent, tau the twist (difference of the material angles plus
 the reference twist, Bergou et al. 2010: parallel transport over the vertex takes out exactly the
@@ -13,8 +14,8 @@ bend), psi the direction of the curvature binormal seen in the frame half way.
 Measures of the strains (kappa1, kappa2, tau) of a vertex:
 
     "logarithm"  the rotation vector of p, all three at once
-    "angle"      phi (cos psi, sin psi), tau                     half-way frame
-    "tangent"    2 tan(phi/2) cos(tau/2) (cos psi, sin psi), tau   Bergou et al. 2008
+    "angle"      phi cos(tau/2) (cos psi, sin psi), tau            mean of both frames
+    "tangent"    2 tan(phi/2) cos(tau/2) (cos psi, sin psi), tau   likewise: Bergou et al. 2008
 
 All are second order in the cell length; `der bench` shows which is most accurate for its time.
 """
@@ -43,76 +44,84 @@ def arctangent_quotient(r):
 
 
 @njit(cache=True)
-def _add_group(p, bend, tangent, rest, stiffness, out_w, out_Q, out_kappa):
-    """Add the energy of the bending strains, or of the twist, of a vertex.
+def _split_energy(p, tangent, rest, stiffness, out_kappa, out_g, out_H):
+    """`vertex_energy` for the measures "angle" and "tangent", bend and twist apart.
 
-    Such a strain is kappa_k = p_k G(p) with G = p0^e A^-m f(B/A), where A sums the squares of the
-    components that make the cosine of the half angle and B those that make its sine. It is
-    homogeneous of degree 0, so neither the norm of p nor its second derivative along exp(w/2)
-    enters.
-
-    Adds to ``out_w`` (4,) and ``out_Q`` (4, 4) the first and second derivatives in p of
-    sum_k stiffness_k (kappa_k - rest_k)^2 / 2, writes the strains and returns that energy.
+    The strains are kappa_k = p_k p0 h(A, B) for the bend and p3 f(B/A)/p0 for the twist, with
+    h = f(B/A)/A and A, B the squares of cosine and sine of the half angles: A = p0^2 + p3^2 and
+    B = p1^2 + p2^2 for the bend, A = p0^2 and B = p3^2 for the twist. Both are homogeneous of
+    degree 0 in p, so neither its norm nor its second derivative along exp(w/2) enters: with w and Q
+    the first and second derivatives in p, g = L' w and H = L' Q L, L = d(p o exp(w/2))/dw.
     """
-    first, last = (1, 2) if bend else (3, 3)
-    # a, b: which components of p belong to A and to B
-    a = (1.0, 0.0, 0.0, 1.0) if bend else (1.0, 0.0, 0.0, 0.0)
-    b = (0.0, 1.0, 1.0, 0.0) if bend else (0.0, 0.0, 0.0, 1.0)
-    A, B = 0.0, 0.0
-    for i in range(4):
-        A += a[i] * p[i] * p[i]
-        B += b[i] * p[i] * p[i]
-    r = B / A
-    if bend and tangent:
-        e, m = 1.0, 1.0
-        f, f1, f2 = 2.0, 0.0, 0.0
-    else:
-        e, m = 0.0, 0.5
-        f, f1, f2 = arctangent_quotient(r)
-    h = A**-m * f
-    h_A = -(A ** (-m - 1.0)) * (m * f + r * f1)
-    h_B = A ** (-m - 1.0) * f1
-    h_AA = A ** (-m - 2.0) * (m * (m + 1.0) * f + 2.0 * (m + 1.0) * r * f1 + r * r * f2)
-    h_AB = -(A ** (-m - 2.0)) * ((m + 1.0) * f1 + r * f2)
-    h_BB = A ** (-m - 2.0) * f2
-    p0e = p[0] if e > 0.0 else 1.0
-    G = p0e * h
-
+    w = np.zeros(4)
+    Q = np.zeros((4, 4))
     dh = np.empty(4)
     dG = np.empty(4)
+    # bend
+    A = p[0] * p[0] + p[3] * p[3]
+    r = (p[1] * p[1] + p[2] * p[2]) / A
+    f, f1, f2 = 2.0, 0.0, 0.0
+    if not tangent:
+        f, f1, f2 = arctangent_quotient(r)
+    h_A, h_B = -(f + r * f1) / A**2, f1 / A**2
+    h_AA, h_BB = (2.0 * f + 4.0 * r * f1 + r * r * f2) / A**3, f2 / A**3
+    h_AB = -(2.0 * f1 + r * f2) / A**3
     for i in range(4):
-        dh[i] = 2.0 * (h_A * a[i] + h_B * b[i]) * p[i]
-        dG[i] = p0e * dh[i]
-    dG[0] += e * h
-
-    energy = 0.0
-    mp = 0.0
-    for k in range(first, last + 1):
-        kappa = p[k] * G
-        out_kappa[k - 1] = kappa
-        moment = stiffness[k - 1] * (kappa - rest[k - 1])
-        energy += 0.5 * moment * (kappa - rest[k - 1])
+        dh[i] = 2.0 * (h_A if i == 0 or i == 3 else h_B) * p[i]
+        dG[i] = p[0] * dh[i]
+    dG[0] += f / A
+    energy, mp = 0.0, 0.0
+    for k in range(1, 3):
+        out_kappa[k - 1] = p[k] * p[0] * f / A
+        moment = stiffness[k - 1] * (out_kappa[k - 1] - rest[k - 1])
+        energy += 0.5 * moment * (out_kappa[k - 1] - rest[k - 1])
         mp += moment * p[k]
-        out_w[k] += moment * G
         for i in range(4):
-            J_i = p[k] * dG[i] + (G if i == k else 0.0)
-            out_w[i] += moment * p[k] * dG[i]
-            out_Q[i, k] += moment * dG[i]
-            out_Q[k, i] += moment * dG[i]
+            J_i = p[k] * dG[i] + (p[0] * f / A if i == k else 0.0)
+            w[i] += moment * J_i
+            Q[i, k] += moment * dG[i]
+            Q[k, i] += moment * dG[i]
             for j in range(4):
-                J_j = p[k] * dG[j] + (G if j == k else 0.0)
-                out_Q[i, j] += stiffness[k - 1] * J_i * J_j
+                J_j = p[k] * dG[j] + (p[0] * f / A if j == k else 0.0)
+                Q[i, j] += stiffness[k - 1] * J_i * J_j
     for i in range(4):
         for j in range(4):
-            second = h_AA * a[i] * a[j] + h_AB * (a[i] * b[j] + b[i] * a[j]) + h_BB * b[i] * b[j]
-            d2G = 4.0 * p0e * second * p[i] * p[j]
+            cosines = (i == 0 or i == 3) + (j == 0 or j == 3)
+            second = h_AA if cosines == 2 else (h_AB if cosines == 1 else h_BB)
+            d2G = 4.0 * p[0] * second * p[i] * p[j]
             if i == j:
-                d2G += 2.0 * p0e * (h_A * a[i] + h_B * b[i])
-            if i == 0:
-                d2G += e * dh[j]
-            if j == 0:
-                d2G += e * dh[i]
-            out_Q[i, j] += mp * d2G
+                d2G += 2.0 * p[0] * (h_A if cosines == 2 else h_B)
+            d2G += dh[j] if i == 0 else 0.0
+            d2G += dh[i] if j == 0 else 0.0
+            Q[i, j] += mp * d2G
+    # twist: tau = 2 arctan(p3/p0) has simple derivatives of its own
+    tau = 2.0 * np.arctan(p[3] / p[0])
+    out_kappa[2] = tau
+    moment = stiffness[2] * (tau - rest[2])
+    energy += 0.5 * moment * (tau - rest[2])
+    t0, t3 = -2.0 * p[3] / A, 2.0 * p[0] / A
+    w[0] += moment * t0
+    w[3] += moment * t3
+    Q[0, 0] += stiffness[2] * t0 * t0 + moment * 4.0 * p[0] * p[3] / A**2
+    Q[3, 3] += stiffness[2] * t3 * t3 - moment * 4.0 * p[0] * p[3] / A**2
+    mixed = stiffness[2] * t0 * t3 + moment * 2.0 * (p[3] * p[3] - p[0] * p[0]) / A**2
+    Q[0, 3] += mixed
+    Q[3, 0] += mixed
+
+    L = np.empty((4, 3))
+    L[0, 0], L[0, 1], L[0, 2] = -0.5 * p[1], -0.5 * p[2], -0.5 * p[3]
+    L[1, 0], L[1, 1], L[1, 2] = 0.5 * p[0], -0.5 * p[3], 0.5 * p[2]
+    L[2, 0], L[2, 1], L[2, 2] = 0.5 * p[3], 0.5 * p[0], -0.5 * p[1]
+    L[3, 0], L[3, 1], L[3, 2] = -0.5 * p[2], 0.5 * p[1], 0.5 * p[0]
+    for i in range(3):
+        out_g[i] = w[0] * L[0, i] + w[1] * L[1, i] + w[2] * L[2, i] + w[3] * L[3, i]
+        for j in range(i, 3):
+            s = 0.0
+            for k in range(4):
+                for n in range(4):
+                    s += L[k, i] * Q[k, n] * L[n, j]
+            out_H[i, j] = s
+            out_H[j, i] = s
     return energy
 
 
@@ -211,25 +220,4 @@ def vertex_energy(p, measure, rest, stiffness, out_kappa, out_g, out_H):
     """
     if measure == 0:
         return _rotation_vector_energy(p, rest, stiffness, out_kappa, out_g, out_H)
-    w = np.zeros(4)
-    Q = np.zeros((4, 4))
-    energy = _add_group(p, True, measure == 2, rest, stiffness, w, Q, out_kappa)
-    energy += _add_group(p, False, False, rest, stiffness, w, Q, out_kappa)
-    L = 0.5 * np.array(
-        (
-            (-p[1], -p[2], -p[3]),
-            (p[0], -p[3], p[2]),
-            (p[3], p[0], -p[1]),
-            (-p[2], p[1], p[0]),
-        )
-    )
-    for i in range(3):
-        out_g[i] = w[0] * L[0, i] + w[1] * L[1, i] + w[2] * L[2, i] + w[3] * L[3, i]
-        for j in range(i, 3):
-            s = 0.0
-            for k in range(4):
-                for n in range(4):
-                    s += L[k, i] * Q[k, n] * L[n, j]
-            out_H[i, j] = s
-            out_H[j, i] = s
-    return energy
+    return _split_energy(p, measure == 2, rest, stiffness, out_kappa, out_g, out_H)

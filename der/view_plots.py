@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path as File
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,10 +19,11 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from der.files import FilePath, write_whole
-from der.record import Mode, Path
+from der.record import Mode, Path, Shapes
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -29,23 +31,24 @@ FORMATS = (".png", ".pdf", ".svg")
 SIZE, DPI = (8.0, 6.0), 150  # inches; 1200 x 900 px
 INK, QUIET = "#222222", "#8a8a8a"
 # line style of a stretch by whether it is stable; blue and vermilion of Okabe and Ito
-STRETCHES = {
-    True: ("stable, γ held", "#0072B2", "-"),
-    False: ("unstable, γ held", "#D55E00", (0, (3.5, 1.6))),
-    None: ("equilibrium (stability not computed)", "#0072B2", "-"),
+STRETCHES: dict[bool | None, tuple[str, str, Any]] = {
+    True: ("stable ($\\gamma$ held)", "#0072B2", "-"),
+    False: ("unstable ($\\gamma$ held)", "#D55E00", (0, (3.5, 1.6))),
+    None: ("equilibria (stability not computed)", "#0072B2", "-"),
 }
+STATE: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.2, "color": INK}
 MARKS = {  # label, marker, size
     "fold": ("fold", "D", 4.6),
-    "limit": ("limit of the moment", "^", 5.6),
+    "limit": ("limit of M", "^", 5.6),
     "branch": ("branch point", "s", 4.8),
     "snap": ("snap", "*", 8.0),
-    "contact": ("strands pass through each other", "x", 4.6),
+    "contact": ("self-crossing", "x", 4.6),
 }
 
-MOST_SNAPSHOTS = 6
+LETTERS = "ABCDEF"  # one for each snapshot
 ACROSS = 240  # quadrilaterals along a ribbon
 HALF_WIDTH = 0.085  # of a ribbon, over the flat ring's mean radius: exaggerated, to be seen
-FRONT, BACK, GRIP = (0.36, 0.61, 0.80), (0.93, 0.72, 0.42), (0.20, 0.20, 0.20)
+FRONT, BACK, GRIP = (0.40, 0.67, 0.88), (0.96, 0.76, 0.46), (0.16, 0.16, 0.16)
 CAMERA = np.array([0.80, 0.45, 0.40])  # the ring lies in the plane of the last two axes
 LIGHT = np.array([0.75, -0.30, 0.60])
 
@@ -78,11 +81,12 @@ def figure_of_path(path: Path) -> Figure:
     _draw_curve(below, path, path.energy, "energy  $U\\,a/GJ$")
     above.axhline(0.0, color=QUIET, linewidth=0.6, zorder=0)
     above.tick_params(labelbottom=False)
+    below.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 2.5, 5, 10]))
     below.set_xlabel("rotation of a grip  $\\gamma/\\pi$", fontsize=9, color=INK)
     if path.shapes is not None:
-        chosen = _snapshots(path)
+        chosen = _snapshots(path, path.shapes)
         row = figure.add_axes((0.02, 0.685, 0.96, 0.265))
-        _draw_ribbons(row, path, chosen)
+        _draw_ribbons(row, path.shapes, path.gamma, chosen)
         for panel, height in ((above, path.moment), (below, path.energy)):
             _letter(panel, path, height, chosen)
     handles = _legend_handles(path)
@@ -90,11 +94,12 @@ def figure_of_path(path: Path) -> Figure:
         handles=handles,
         loc="lower center",
         bbox_to_anchor=(0.5, 0.005),
-        ncols=len(handles),
+        ncols=len(handles) if len(handles) <= 7 else 4,
         frameon=False,
         fontsize=7.5,
         handlelength=2.4,
-        columnspacing=1.6,
+        columnspacing=1.7,
+        handletextpad=0.5,
         labelcolor=INK,
     )
     return figure
@@ -133,23 +138,29 @@ def _title(path: Path) -> str:
         ring.append("about y")
     section = path.section
     if section.get("h_over_t") is None:
-        bar = f"α = {section['alpha']:.4g}, β = {section['beta']:.4g}"
+        bar = rf"$\alpha$ = {section['alpha']:.4g}, $\beta$ = {section['beta']:.4g}"
     else:
-        bar = f"h/t = {section['h_over_t']:g}, ν = {section['nu']:g}"
+        bar = rf"h/t = {section['h_over_t']:g}, $\nu$ = {section['nu']:g}"
     edges = path.numerics.get("n_edges")
     parts = [
-        " ".join([str(path.ring["shape"]), ", ".join(ring)]).strip(),
+        ", ".join([str(path.ring["shape"]), *ring]),
         bar,
         "boundary-value problem" if edges is None else f"{edges} edges",
-        f"ends at γ = {path.gamma[-1] / math.pi:.4g} π" if path.mode is None else _words(path.mode),
+        _words(path.mode) if path.mode else rf"up to $\gamma$ = {_times_pi(path.gamma[-1])}",
     ]
     if path.status != "done":
         parts.append(path.status)
     return "   |   ".join(parts)
 
 
+def _times_pi(angle: float) -> str:
+    """Return an angle as a multiple of pi: "0", "0.211 π", "π"."""
+    multiple = f"{angle / math.pi:.3g}"
+    return {"0": "0", "1": "π"}.get(multiple, f"{multiple} π")
+
+
 def _words(mode: Mode) -> str:
-    """The mode in three words or so: "folds, stable, snap-through"."""
+    """Return the mode in a few words: "folds, stable, snap-through"."""
     words = ["folds" if mode.foldable else "does not fold"]
     if mode.stable is not None:
         words.append("stable" if mode.stable else "unstable")
@@ -169,10 +180,10 @@ def _legend_handles(path: Path) -> list[Line2D]:
     for kind, (label, marker, size) in MARKS.items():
         if kind in kinds:
             handles.append(Line2D([], [], label=label, **_mark(marker, size)))
-    return handles
+    return [*handles, Line2D([], [], label="computed state", **STATE)]
 
 
-def _mark(marker: str, size: float) -> dict[str, object]:
+def _mark(marker: str, size: float) -> dict[str, Any]:
     return {
         "linestyle": "none",
         "marker": marker,
@@ -191,7 +202,7 @@ def _draw_curve(panel: Axes, path: Path, height: Array, label: str) -> None:
     for stable, points in _stretches(path, height):
         _, colour, style = STRETCHES[stable]
         panel.plot(*points.T, color=colour, linestyle=style, linewidth=1.5, zorder=2)
-    panel.plot(path.gamma / math.pi, height, ".", color=INK, markersize=2.2, zorder=3)
+    panel.plot(path.gamma / math.pi, height, zorder=3, **STATE)
     for kind, (_, marker, size) in MARKS.items():
         at = [point.position for point in path.points if point.kind == kind]
         panel.plot(path.gamma[at] / math.pi, height[at], zorder=4, **_mark(marker, size))
@@ -212,7 +223,7 @@ def _stability(path: Path) -> list[bool | None]:
     known = [None if i is None else i == 0 for i in path.index.tolist()]
     if len(known) == 1:
         return known
-    found = [a if a is not None else b for a, b in zip(known[:-1], known[1:], strict=True)]
+    found = [a if a is not None else b for a, b in pairwise(known)]
     for way in (range(1, len(found)), range(len(found) - 2, -1, -1)):
         for k in way:
             if found[k] is None:
@@ -235,18 +246,18 @@ def _stretches(path: Path, height: Array) -> Iterator[tuple[bool | None, Array]]
 def _smooth(path: Path, height: Array, per: int = 16) -> Array:
     """Return `per` points an interval on a smooth curve (gamma/pi, height) through all states.
 
-    Monotone cubics of the chord length along (gamma, M): gamma turns back at the stored folds and M
-    at the stored limits, and nowhere else.
+    The natural cubic spline of the chord length along (gamma, M), which turns with the path through
+    folds; on circles it is within 0.3% of the panel of the true path, monotone cubics within 0.4%.
     """
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import CubicSpline
 
     values = np.column_stack([path.gamma / math.pi, height])
     chord = _chord(path)
-    is_new = np.append(True, np.diff(chord) > 0)
+    is_new = np.append(True, np.diff(chord) > 1e-5)  # neighbours in the same place make no slope
     if np.count_nonzero(is_new) == 1:
         return np.repeat(values[:1], per * (len(path) - 1) + 1, axis=0)
     at = np.interp(np.arange(per * (len(path) - 1) + 1) / per, np.arange(len(path)), chord)
-    curve: Array = PchipInterpolator(chord[is_new], values[is_new])(at)
+    curve: Array = CubicSpline(chord[is_new], values[is_new], bc_type="natural")(at)
     return curve
 
 
@@ -261,19 +272,20 @@ def _letter(panel: Axes, path: Path, height: Array, chosen: list[int]) -> None:
     panel.autoscale_view()
     to_pixels = panel.transData.transform
     obstacles = to_pixels(_smooth(path, height))
-    low, high = panel.get_window_extent().extents.reshape(2, 2)
+    low, high = panel.get_window_extent().get_points()
     turn = np.arange(16) * math.pi / 8
     offsets = 9.5 * np.column_stack([np.cos(turn), np.sin(turn)])  # points
-    for letter, k in zip("ABCDEF", chosen, strict=False):
+    for letter, k in zip(LETTERS, chosen, strict=False):
         here = np.array([path.gamma[k] / math.pi, height[k]])
         places = to_pixels(here) + offsets * DPI / 72
         room = np.linalg.norm(places[:, None] - obstacles, axis=2).min(axis=1)
         room[np.any((places < low + 8) | (places > high - 8), axis=1)] = -1
         best = int(np.argmax(room))
+        panel.plot(*here, "o", color=INK, markersize=3.6, zorder=3)
         panel.annotate(
             letter,
-            here,
-            xytext=tuple(offsets[best]),
+            (float(here[0]), float(here[1])),
+            xytext=(float(offsets[best, 0]), float(offsets[best, 1])),
             textcoords="offset points",
             ha="center",
             va="center",
@@ -289,28 +301,27 @@ def _letter(panel: Axes, path: Path, height: Array, chosen: list[int]) -> None:
 # --- Ribbons ---------------------------------------------------------------------------------
 
 
-def _snapshots(path: Path) -> list[int]:
-    """Return states spread evenly along the path, the first, the last and the peak among them."""
-    chord = _chord(path)
-    even = np.linspace(0.0, chord[-1], MOST_SNAPSHOTS)
-    chosen = [int(np.argmin(np.abs(chord - place))) for place in even]
+def _snapshots(path: Path, shapes: Shapes) -> list[int]:
+    """Return states spread evenly over the motion, the first, the last and the peak among them."""
+    moved = np.linalg.norm(np.diff(shapes.x, axis=0), axis=(1, 2))
+    way = np.append(0.0, np.cumsum(moved))
+    even = np.linspace(0.0, way[-1], len(LETTERS))
+    chosen = [int(np.argmin(np.abs(way - place))) for place in even]
     peak = int(np.argmax(np.abs(path.moment)))
-    inner = range(1, MOST_SNAPSHOTS - 1)
-    nearest = min(inner, key=lambda i: abs(chord[chosen[i]] - chord[peak]))
     if peak not in chosen:
-        chosen[nearest] = peak
+        inner = range(1, len(LETTERS) - 1)
+        chosen[min(inner, key=lambda i: abs(way[chosen[i]] - way[peak]))] = peak
     return sorted(set(chosen))
 
 
-def _draw_ribbons(row: Axes, path: Path, chosen: list[int]) -> None:
+def _draw_ribbons(row: Axes, shapes: Shapes, gamma: Array, chosen: list[int]) -> None:
     """Draw the ring at the chosen states, all from one side and in one scale."""
-    assert path.shapes is not None  # noqa: S101
-    x, frames = path.shapes.x, path.shapes.frames
+    x, frames = shapes.x, shapes.frames
     length = float(np.linalg.norm(np.diff(x[0], axis=0, append=x[0][:1]), axis=1).sum())
     width = HALF_WIDTH * length / (2 * math.pi)
     ribbons = [_ribbon(x[k], frames[k, :, 0], width) for k in chosen]
     spans = np.array([np.ptp(corners.reshape(-1, 2), axis=0) for corners, _ in ribbons])
-    slot, tall = 1.12 * spans[:, 0].max(), 1.04 * spans[:, 1].max()
+    slot, tall = 1.12 * spans[:, 0].max(), 1.06 * spans[:, 1].max()
     for i, (corners, colours) in enumerate(ribbons):
         flat = corners.reshape(-1, 2)
         centre = (flat.min(axis=0) + flat.max(axis=0)) / 2
@@ -318,7 +329,7 @@ def _draw_ribbons(row: Axes, path: Path, chosen: list[int]) -> None:
         row.add_collection(
             PolyCollection(list(placed), facecolors=colours, edgecolors=colours, linewidths=0.25)
         )
-        text = f"$\\bf{{{'ABCDEF'[i]}}}$   γ = {path.gamma[chosen[i]] / math.pi:.3g} π"
+        text = rf"$\bf{{{LETTERS[i]}}}$   $\gamma$ = {_times_pi(gamma[chosen[i]])}"
         row.text(i * slot, -tall / 2, text, ha="center", va="top", fontsize=8, color=INK)
     row.set_xlim(-slot / 2, (len(ribbons) - 0.5) * slot)
     row.set_ylim(-0.62 * tall, 0.5 * tall)
@@ -345,7 +356,7 @@ def _ribbon(x: Array, d1: Array, width: float) -> tuple[Array, Array]:
     towards, right, up = _camera()
     normal = np.cross(np.diff(centre, axis=0), across[1:] + across[:-1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    shade = 0.55 + 0.45 * np.abs(normal @ (LIGHT / np.linalg.norm(LIGHT)))
+    shade = 0.62 + 0.38 * np.abs(normal @ (LIGHT / np.linalg.norm(LIGHT)))
     colour = np.where((normal @ towards > 0)[:, None], FRONT, BACK)
     from_grip = np.abs((np.arange(ACROSS) + 0.5 + ACROSS / 4) % (ACROSS / 2) - ACROSS / 4)
     colour = np.where((from_grip < ACROSS / 80)[:, None], GRIP, colour) * shade[:, None]

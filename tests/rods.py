@@ -1,6 +1,7 @@
 """Rods, states and small numerics that the physics tests share."""
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from der.frames import Array, rotation, turned_all
 from der.linking import unfold
 from der.rod import Rod, State, rod
 from der.sector import Sector
+from der.stability import all_modes, raw_index
 from der.supports import Supports
 
 E1, E2, E3 = np.eye(3)
@@ -49,21 +51,25 @@ def straight(n_cells: int, stiffness: tuple[float, float, float], **options: obj
     return rod(np.full(n_cells, 1 / n_cells), np.zeros(n_cells), stiffness, **options)
 
 
-def covered_circle(n: int, kappa0: float, stiffness: tuple[float, float, float], n_edges: int):
-    """Closed rod of length 2 pi and natural curvature ``kappa0``, and its n-covered circle."""
+def covered_circle(
+    n: int, kappa0: float, stiffness: tuple[float, float, float], n_edges: int, **options: object
+) -> tuple[Rod, State]:
+    """Return the closed rod of length 2 pi, curved by ``kappa0``, and its n-covered circle."""
     cell = np.full(n_edges, 2 * np.pi / n_edges)
-    body = rod(cell, kappa0 * cell, stiffness, closed=True)
+    body = rod(cell, kappa0 * cell, stiffness, closed=True, **options)
     return body, unloaded(body, turned_about(1, n * cell[0] * np.arange(n_edges)), 3)
 
 
 def solved(body: Rod, held: Supports, start: State, **options: object) -> Equilibrium:
-    """The equilibrium from ``start``; a failed solve fails the test."""
+    """Return the equilibrium from ``start``; a failed solve fails the test."""
     found = equilibrium(body, held, start, **options)
     assert found.converged, ADVICE[found.outcome]
     return found
 
 
-def walk(piece: Sector, length: float, stop: Callable[[Equilibrium], bool]) -> Iterator[Equilibrium]:
+def walk(
+    piece: Sector, length: float, stop: Callable[[Equilibrium], bool]
+) -> Iterator[Equilibrium]:
     """States on the path from the flat ring, about ``length`` apart, until ``stop`` says so."""
     here = solved(piece.body, piece.held, piece.start)
     while True:
@@ -88,14 +94,14 @@ def walk(piece: Sector, length: float, stop: Callable[[Equilibrium], bool]) -> I
 
 
 def lifted(piece: Sector, state: State, onto: Sector) -> Equilibrium:
-    """A quarter's state as an equilibrium of a half or of the full ring, solved at its load."""
+    """Return a quarter's state as an equilibrium of a half or of the full ring, at its load."""
     quat = unfold(state.quat, piece.copies)[: onto.body.n_edges]
     start = unloaded(onto.body, quat, len(onto.held.target), state.load)
     return solved(onto.body, onto.held, start)
 
 
 def three_covered(piece: Sector) -> State:
-    """The folded circle, gamma = pi, on a quarter: curvature 3 from the turned grip on."""
+    """Return the folded circle, gamma = pi, of a quarter: curvature 3 from the turned grip on."""
     s = piece.arc_length
     grip = turned_rigidly(piece.start.quat[-1:], -np.pi * E3)
     quat = turned_all(np.repeat(grip, len(s), axis=0), 3 * np.outer(s - s[-1], E1))
@@ -109,21 +115,29 @@ def richardson(*values: float) -> float:
     """Limit of ``values`` from meshes refined by 2 each time, errors in even powers of the cell."""
     row = list(values)
     for order in range(2, 2 * len(values), 2):
-        row = [b + (b - a) / (2**order - 1) for a, b in zip(row, row[1:], strict=False)]
+        row = [b + (b - a) / (2**order - 1) for a, b in pairwise(row)]
     return row[0]
+
+
+def index_of(body: Rod, held: Supports, state: State) -> int:
+    """Index of a state on all that its supports leave free, by the engine's factorisation."""
+    return raw_index(body, held, all_modes(held), state)
 
 
 def first_change(index: Callable[[float], int], low: float, high: float) -> float:
     """Where ``index`` leaves its value at ``low``, bracketed by bisection to 1e-11."""
-    there = index(low)
-    assert index(high) != there, f"index {there} at both ends"
+    there, beyond = index(low), index(high)
+    assert min(there, beyond) >= 0, "the factorisation gave up"
+    assert there != beyond, f"index {there} at both ends"
     while abs(high - low) > 1e-11 * (1 + abs(high)):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if index(middle) == there else (low, middle)
     return 0.5 * (low + high)
 
 
-def dense(body: Rod, held: Supports, state: State, *, load_free: bool = False):
+def dense(
+    body: Rod, held: Supports, state: State, *, load_free: bool = False
+) -> tuple[Array, Array]:
     """Hessian of the Lagrangian (N, N) in the unknowns that move, and their conditions (N, n_c).
 
     With ``load_free`` the load is one more unknown, the last.

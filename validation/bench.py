@@ -51,14 +51,17 @@ def run(file: Path | None = None, *, quick: bool = False) -> list[Row]:
     rows = []
     for row in measure(quick=quick):
         rows.append(row)
-        goal = "" if row.goal is None else f"  goal {row.goal:g}"
-        print(
-            f"{row.group:12} {row.case:44} {row.value:12.4g} {row.unit:8}{goal}  {row.note}".rstrip()
-        )
+        print(_line(row))
     if file is not None:
         record = {"machine": machine(), "rows": [asdict(row) for row in rows]}
         file.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
     return rows
+
+
+def _line(row: Row) -> str:
+    goal = "" if row.goal is None else f"goal {row.goal:g}"
+    value = f"{row.value:11.4g} {row.unit:7}"
+    return f"{row.group:12}{row.case:46}{value} {goal:11} {row.note}".rstrip()
 
 
 def machine() -> str:
@@ -123,14 +126,15 @@ def _needs(repeats: int) -> Iterator[Row]:
     bare = {"stability": False, "contacts": False}
     base = cpu_time(lambda: der.fold(_circle(4.0, **bare)), repeats)
     yield Row("need", "none: h/t 4, N 64, quarter", 1e3 * base, "ms")
-    for name, wants in {
+    cases: dict[str, dict[str, object]] = {
         "stability": {"stability": True},
         "contacts": {"contacts": True},
         "shapes": {"shapes": True},
         "full ring": {"sector": "full"},
         "half ring": {"sector": "half"},
         "finite stretch": {"stretch": "finite"},
-    }.items():
+    }
+    for name, wants in cases.items():
         scene = _circle(4.0, **{**bare, **wants})
         seconds = cpu_time(lambda scene=scene: der.fold(scene), repeats)  # type: ignore[misc]
         yield Row("need", name, seconds / base, "times")
