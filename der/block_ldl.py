@@ -146,7 +146,7 @@ def factor(diag, off, border):
     count = 0
     negative = 0
     unit = np.empty(b)  # square root of an unknown's own stiffness: pivots are judged by it
-    whole = 0.0
+    whole = 1e-300
     for j in range(n):
         for k in range(b):
             whole = max(whole, abs(diag[j, k, k]))
@@ -248,8 +248,8 @@ def solve_band(inverse, lower, x):
 def inertia(factors):
     """Number of negative eigenvalues of K, and how safe that is: smallest scaled border pivot.
 
-    The count is -1 where `factor` gave up. A second value near rounding (1e-10) means that K is
-    close to singular and the count may be off by one.
+    The count is -1 where `factor` gave up. A second value below about 1e-8 means that K is close to
+    singular and the count may be off by one.
     """
     M = factors.schur.shape[0]
     if factors.negative < 0:

@@ -301,19 +301,19 @@ def _progress(scene: Scene, *, quiet: bool) -> Iterator[Callable[[float], object
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
-        TextColumn("gamma = {task.fields[gamma]:.3f}"),
+        TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.fields[states]} states"),
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("fold", total=scene.gamma_max, gamma=0.0, states=0)
+        task = bar.add_task("loading kernels (compiled once, in half a minute)", total=None)
         states = 0
 
         def tick(gamma: float) -> None:
             nonlocal states
             states += 1
-            bar.update(task, completed=gamma, gamma=gamma, states=states)
+            text = f"gamma = {gamma:.3f}, {states} states"
+            bar.update(task, completed=gamma, total=scene.gamma_max, description=text)
 
         yield tick
 

@@ -93,7 +93,7 @@ class Equilibrium:
     tangent: Direction  # of the path, of unit length in the mass-weighted norm
     moment_rate: float  # d moment along the tangent
     negative: int  # negative eigenvalues of the bordered matrix; -1: the factorisation gave up
-    margin: float  # smallest scaled pivot; the count is safe above rounding (1e-10)
+    margin: float  # smallest scaled pivot; the count is safe above about 1e-8
 
     @property
     def converged(self) -> bool:

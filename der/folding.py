@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -14,8 +15,10 @@ from der.assembly import assemble
 from der.checks import counts
 from der.path import Stuck, Tally, Visit, Wanted, follow, three_covered
 from der.record import AtPi, Path, Point, Shapes, Timing, folding_mode
+from der.ring import circle
 from der.rod import State
 from der.scene import Scene
+from der.sections import section
 from der.sector import Sector, free_ring, sector
 from der.stability import all_modes, index
 
@@ -91,6 +94,7 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
         contacts=scene.looks_for_contacts,
         tolerance=scene.tolerance,
     )
+    _load_kernels(wanted.stability, wanted.contacts)
     tally = Tally()
     visits: list[Visit] = []
     started = time.perf_counter()
@@ -109,6 +113,14 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
     except KeyboardInterrupt:
         raise Interrupted(record("interrupted", "stopped by the user")) from None
     return record("done")
+
+
+@cache
+def _load_kernels(stability: bool, contacts: bool) -> None:
+    """Load or compile the kernels that a path needs, once a process, before the clock starts."""
+    piece = sector(circle(), section(1.0, 1.0), 8)
+    for _ in follow(piece, Wanted(load_max=0.1, stability=stability, contacts=contacts), Tally()):
+        pass
 
 
 def _record(

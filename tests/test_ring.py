@@ -238,7 +238,7 @@ def test_circle_is_a_circle():
 
 @pytest.mark.parametrize("natural_curvature", [0.0, 2.666667, -1.777778])
 def test_natural_curvature_changes_the_bar_not_the_ring(natural_curvature):
-    """truth.md: the flat ring with changed kappa0; its natural turning is kappa0 s."""
+    """The flat ring with changed kappa0; its natural turning is kappa0 s."""
     ring, s = circle(natural_curvature), np.linspace(0, 2 * np.pi, 9)
     assert_allclose(ring.natural_angle(s), natural_curvature * s, atol=2e-14)
     assert_allclose(ring.curvature(s), natural_curvature)
@@ -358,7 +358,7 @@ def test_largest_fillets_make_a_circle_of_a_triangle():
 
 
 def test_vertex_angle_is_in_degrees_in_the_record():
-    """design.md: radians in Python, degrees in files."""
+    """Radians in Python, degrees in files."""
     assert triangle(math.pi / 3, 0.1).to_json() == {
         "shape": "triangle",
         "vertex_angle": 60.0,
@@ -368,7 +368,7 @@ def test_vertex_angle_is_in_degrees_in_the_record():
 
 
 def test_record_of_an_ellipse():
-    """design.md, the record."""
+    """The record names a shape and its parameters."""
     record = {"shape": "ellipse", "b_over_a": 0.85, "twist_axis": "y"}
     assert ellipse(0.85, "y").to_json() == record
 
@@ -525,7 +525,7 @@ def test_bad_record_is_named(record, message):
 
 
 def test_statement_imports_neither_scipy_nor_numba():
-    """design.md: the statement holds no kernels; scipy is loaded by the shape that needs it."""
+    """The statement holds no kernels; scipy is loaded by the shape that needs it."""
     code = "import sys, der.ring; print({'scipy', 'numba'} & set(sys.modules))"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "set()"

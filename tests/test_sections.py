@@ -15,7 +15,7 @@ def torsion_series(h_over_t: float, n_terms: int = 20_000) -> float:
 
 @pytest.mark.parametrize(("h_over_t", "alpha"), [(4, 0.7715693320), (1, 1.5412666625)])
 def test_alpha_is_that_of_truth_md(h_over_t, alpha):
-    """truth.md, circular ring: alpha to the ten decimals given."""
+    """Alpha of the circular ring to the ten decimals given."""
     assert rectangular_section(h_over_t).alpha == pytest.approx(alpha, abs=5e-11)
 
 
@@ -40,7 +40,7 @@ def test_flat_bar_agrees_with_the_series():
 
 @pytest.mark.parametrize("h_over_t", [0.05, 0.5, 0.99])
 def test_turning_the_bar_on_its_side_exchanges_the_ratios(h_over_t):
-    """J is the same for (h, t) and (t, h), so EI1 and EI2 change places (truth.md: lambda)."""
+    """J is the same for (h, t) and (t, h), so EI1 and EI2 change places."""
     bar, turned = rectangular_section(h_over_t), rectangular_section(1 / h_over_t)
     assert (bar.alpha, bar.beta) == pytest.approx((turned.beta, turned.alpha), rel=1e-14)
 
@@ -58,7 +58,7 @@ def test_poisson_ratio_enters_as_one_plus_nu():
 
 
 def test_rectangular_section_remembers_its_shape():
-    """The record (design.md) names h_over_t and nu beside alpha and beta."""
+    """The record names h_over_t and nu beside alpha and beta."""
     bar = rectangular_section(2, nu=0.2)
     assert (bar.h_over_t, bar.nu) == (2.0, 0.2)
 

@@ -1,8 +1,7 @@
 """Reference curves, and how far a computed path lies from one.
 
 The error is a normal distance in scaled planes, not a difference at equal gamma: that one grows
-without bound on steep parts and has no meaning at folds (truth.md, "How far plain discretisations
-are off").
+without bound on steep parts and has no meaning at folds.
 """
 
 from __future__ import annotations
@@ -100,7 +99,7 @@ class ReferenceCurve:
 
 
 def read_reference(path: str | os.PathLike[str]) -> ReferenceCurve:
-    """Table by AUTO-07p as a reference curve (truth.md, "Reference curves").
+    """Table by AUTO-07p as a reference curve.
 
     Parameters
     ----------
