@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 SHAPES = ("circle",)
 UNSAVED = File("der-unfinished.json")  # where an unfinished path goes if no file was named
+OUTPUT = File("-")  # standard output
 
 app = typer.Typer(
     help="Discrete elastic rods for rings that fold by twisting.",
@@ -48,10 +49,9 @@ def main(arguments: list[str] | None = None) -> None:
         code = 2
     except (typer.Abort, KeyboardInterrupt):
         code = 130
-    except BrokenPipeError:
-        # whoever read our output has gone: nothing to tell, and nothing more to flush
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
+    except OSError as wrong:  # a full disk behind standard output, for one
+        _say(f"der: {wrong}")
+        code = 3
     sys.exit(code or 0)
 
 
@@ -73,6 +73,19 @@ def _whole(text: str) -> int:
 
 def _say(line: str) -> None:
     print(line, file=sys.stderr)
+
+
+def _show(text: str) -> bool:
+    """Print on standard output; False, in words, where it takes no more."""
+    try:
+        print(text, flush=True)
+    except OSError as wrong:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush
+        if isinstance(wrong, BrokenPipeError):
+            return True  # whoever read our output has had enough
+        _say(f"der: could not write to standard output: {wrong.strerror}")
+        return False
+    return True
 
 
 def _show_version(wanted: bool) -> None:
@@ -205,10 +218,21 @@ def _section(h_over_t: float | None, alpha: float | None, beta: float | None, nu
 
     if h_over_t is not None:
         if alpha is not None or beta is not None:
-            raise ValueError("h_over_t cannot be given together with --alpha and --beta")
-        return rectangular_section(h_over_t, nu)
-    if alpha is None or beta is None:
+            raise ValueError(
+                f"h_over_t cannot be given together with --alpha and --beta, got {h_over_t}"
+            )
+        try:
+            return rectangular_section(h_over_t, nu)
+        except ValueError as wrong:
+            if str(wrong).startswith(("alpha", "beta")):  # not what the user gave
+                raise ValueError(f"h_over_t is too extreme: {wrong} for {h_over_t}") from None
+            raise
+    if alpha is None and beta is None:
         raise ValueError("h_over_t (or both --alpha and --beta) must be given, got neither")
+    if alpha is None:
+        raise ValueError(f"alpha must be given together with --beta {beta}, got none")
+    if beta is None:
+        raise ValueError(f"beta must be given together with --alpha {alpha}, got none")
     return section(alpha, beta)
 
 
@@ -245,7 +269,7 @@ def _targets(json: str | None, plot: str | None, out: str | None) -> dict[str, F
             raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
         targets["plot"] = File(plot)
     for name, file in targets.items():
-        if str(file) != "-":
+        if file != OUTPUT:
             _check_writable(name if name != "shapes" else "out", file)
     return targets
 
@@ -254,6 +278,8 @@ def _check_writable(name: str, file: File) -> None:
     """Raise ValueError where ``file`` cannot be written, before hours are spent on it."""
     if file.is_dir():
         raise ValueError(f"{name} must be a file, got the folder {str(file)!r}")
+    if file.exists() and not file.is_file():  # it would be replaced by a file: /dev/null!
+        raise ValueError(f"{name} must be a regular file, got {str(file)!r}")
     try:
         with tempfile.TemporaryFile(dir=file.parent):
             pass
@@ -277,18 +303,25 @@ def _fold(scene: Scene, targets: dict[str, File], *, quiet: bool) -> int:
         path = unfinished.path
         code = 3 if isinstance(unfinished, NotConverged) else 130
         file = targets.setdefault("json", UNSAVED)
-        targets.setdefault("shapes", file.with_suffix(".npz") if str(file) != "-" else UNSAVED)
-        _say(
-            f"der: {path.message}; the path up to its last good state, at gamma = "
-            f"{path.gamma[-1] if len(path) else 0.0:.8g}, is in {file}"
-        )
+        targets.setdefault("shapes", (UNSAVED if file == OUTPUT else file).with_suffix(".npz"))
     if not _write(path, targets):
         code = code or 3
-    if not quiet and str(targets.get("json")) != "-":
+    if path.status != "done":
+        _say(f"der: {path.message}; {_whereabouts(path, targets['json'])}")
+    if not quiet and targets.get("json") != OUTPUT:
         from der.summary import summary
 
-        print(summary(path))
+        if not _show(summary(path)):
+            code = code or 3
     return code
+
+
+def _whereabouts(path: Path, file: File) -> str:
+    """Where an unfinished path went, and how far it got."""
+    place = "standard output" if file == OUTPUT else str(file)
+    if not len(path):
+        return f"the record, without any state, is in {place}"
+    return f"the path up to its last good state, at gamma = {path.gamma[-1]:.8g}, is in {place}"
 
 
 @contextmanager
@@ -319,16 +352,18 @@ def _progress(scene: Scene, *, quiet: bool) -> Iterator[Callable[[float], object
 
 
 def _write(path: Path, targets: dict[str, File]) -> bool:
-    """Write the record first, then its shapes and picture; say what could not be written."""
+    """Write the record first, then its shapes and picture; say what could not be written.
+
+    A record that cannot be written where it should goes to standard output, also in ``targets``:
+    nothing already computed is lost.
+    """
     done = True
     for name in ("json", "shapes", "plot"):
         file = targets.get(name)
         if file is None:
             continue
         try:
-            if name == "json" and str(file) == "-":
-                print(path.to_json())
-            elif name == "json":
+            if name == "json" and file != OUTPUT:
                 path.save(file)
             elif name == "shapes" and path.shapes is not None:
                 path.shapes.save(file)
@@ -340,7 +375,9 @@ def _write(path: Path, targets: dict[str, File]) -> bool:
             done = False
             _say(f"der: could not write {file}: {wrong}")
             if name == "json":
-                print(path.to_json())  # nothing already computed is lost
+                targets["json"] = OUTPUT
+        if name == "json" and targets["json"] == OUTPUT:
+            done = _show(path.to_json()) and done
     return done
 
 

@@ -18,7 +18,7 @@ from der.assembly import assemble, take_out
 from der.block_ldl import factor, inertia, solve_refined
 from der.frames import Array, into_frame, turned
 from der.rod import Rod, State
-from der.supports import Supports
+from der.supports import Supports, check_cut
 
 _LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the path
 
@@ -305,10 +305,16 @@ def equilibrium(
     moment : value of dL/dload with Control.MOMENT.
     tolerance : of the residual; rounding sets a floor of ten times its estimate.
 
+    Raises
+    ------
+    ValueError
+        For a closed rod whose edge 0 is free (`supports.check_cut`).
+
     Notes
     -----
-    Failure is a value: see `Equilibrium.outcome` and `ADVICE`.
+    Failure to converge is a value: see `Equilibrium.outcome` and `ADVICE`.
     """
+    check_cut(body, held.free)
     if along is None:
         row, row_load = np.zeros(held.free.shape), 1.0
     else:

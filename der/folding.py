@@ -13,14 +13,16 @@ import numpy as np
 
 from der.assembly import assemble
 from der.checks import counts
-from der.path import Stuck, Tally, Visit, Wanted, follow, three_covered
+from der.path import follow
 from der.record import AtPi, Path, Point, Shapes, Timing, folding_mode
 from der.ring import circle
 from der.rod import State
 from der.scene import Scene
 from der.sections import section
 from der.sector import Sector, free_ring, sector
+from der.special import Visit, Wanted, three_covered
 from der.stability import all_modes, index
+from der.step import Stuck, Tally
 
 _NO_MOMENT = 1e-6  # of the largest |M|: a state of rest
 _BALANCED = 1e-6  # residual, of the largest bending moment, of a free ring at rest

@@ -36,38 +36,46 @@ def writhe(x, copies):
     total = 0.0
     for i in range(last + 1):
         share = 0.5 if copies > 1 and (i == 0 or i == last) else 1.0
-        for k in range(n):
-            apart = abs(i - k)
-            if apart > 1 and apart < n - 1:
-                total += share * _solid_angle(x, i, k)
+        total += share * _solid_angles(x, i)
     return copies * total / (4.0 * np.pi)
 
 
 @njit(cache=True)
-def _solid_angle(x, i, k):
-    """Signed area on the sphere of the directions from edge ``i`` to edge ``k``."""
+def _solid_angles(x, i):
+    """Sum of the signed areas, on the sphere, of the directions from edge ``i`` to other edges.
+
+    The directions to an edge make a quadrilateral a, b, c, d; its two triangles (Van Oosterom &
+    Strackee 1983) are arguments of complex numbers, added by multiplying these. The area is below
+    2 pi, so half of it never leaves the principal branch. Edge k + 1 takes over two corners of k.
+    """
     n = x.shape[0]
-    i1, k1 = i, k
-    i, k = (i - 1) % n, (k - 1) % n
-    ax, ay, az = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-    bx, by, bz = x[k1, 0] - x[i, 0], x[k1, 1] - x[i, 1], x[k1, 2] - x[i, 2]
-    cx, cy, cz = x[k1, 0] - x[i1, 0], x[k1, 1] - x[i1, 1], x[k1, 2] - x[i1, 2]
-    dx, dy, dz = x[k, 0] - x[i1, 0], x[k, 1] - x[i1, 1], x[k, 2] - x[i1, 2]
-    # two triangles, Van Oosterom & Strackee 1983: one arctangent each
+    start = i - 1 if i > 0 else n - 1
+    k = i + 1 if i + 1 < n else 0  # the vertex where the first edge not next to i begins
+    ax, ay, az = x[k, 0] - x[start, 0], x[k, 1] - x[start, 1], x[k, 2] - x[start, 2]
+    dx, dy, dz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
     a = np.sqrt(ax * ax + ay * ay + az * az)
-    b = np.sqrt(bx * bx + by * by + bz * bz)
-    c = np.sqrt(cx * cx + cy * cy + cz * cz)
     d = np.sqrt(dx * dx + dy * dy + dz * dz)
-    ab = ax * bx + ay * by + az * bz
-    bc = bx * cx + by * cy + bz * cz
-    ca = cx * ax + cy * ay + cz * az
-    cd = cx * dx + cy * dy + cz * dz
     da = dx * ax + dy * ay + dz * az
-    abc = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-    acd = ax * (cy * dz - cz * dy) + ay * (cz * dx - cx * dz) + az * (cx * dy - cy * dx)
-    first = np.arctan2(abc, a * b * c + ab * c + bc * a + ca * b)
-    second = np.arctan2(acd, a * c * d + ca * d + cd * a + da * c)
-    return -2.0 * (first + second)
+    total = 0.0
+    for _ in range(n - 3):
+        k = k + 1 if k + 1 < n else 0
+        bx, by, bz = x[k, 0] - x[start, 0], x[k, 1] - x[start, 1], x[k, 2] - x[start, 2]
+        cx, cy, cz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        b = np.sqrt(bx * bx + by * by + bz * bz)
+        c = np.sqrt(cx * cx + cy * cy + cz * cz)
+        ca = cx * ax + cy * ay + cz * az
+        bc = bx * cx + by * cy + bz * cz
+        # a . (b x c) and a . (c x d)
+        ux, uy, uz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax  # c x a
+        abc = ux * bx + uy * by + uz * bz
+        acd = -(ux * dx + uy * dy + uz * dz)
+        r1 = (a * b + ax * bx + ay * by + az * bz) * c + bc * a + ca * b
+        r2 = (a * c + ca) * d + (cx * dx + cy * dy + cz * dz) * a + da * c
+        total -= 2.0 * np.arctan2(abc * r2 + acd * r1, r1 * r2 - abc * acd)
+        ax, ay, az, a = bx, by, bz, b
+        dx, dy, dz, d = cx, cy, cz, c
+        da = bc
+    return total
 
 
 @njit(cache=True)

@@ -18,7 +18,7 @@ from der.assembly import assemble, position_rows, take_out
 from der.block_ldl import factor, inertia, solve_refined
 from der.frames import Array
 from der.rod import Rod, State
-from der.supports import Supports
+from der.supports import Supports, check_cut
 
 _SAFE = 1e-7  # scaled border pivot above which an index needs no second look: wrong counts were
 # seen up to 6e-10 on random matrices
@@ -62,6 +62,7 @@ def index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int 
     A state of ``held`` at which the smallest pivot is tiny is factored again with a shift of
     either sign: equal counts certify the index, unequal ones make it None.
     """
+    check_cut(body, modes.free)
     at = (body, held, modes, state.quat, state.stretch, state.force, state.load)
     negative, margin = _count(*at, 0.0)
     if negative >= 0 and margin > _SAFE:
@@ -113,6 +114,7 @@ def softest_modes(
     Subspace iteration with the inverse (Bathe), two guard vectors, 30 rounds: enough where
     the wanted eigenvalues are separated by a factor of two from the rest.
     """
+    check_cut(body, modes.free)
     n, b = modes.free.shape
     size = min(count + 2, int(modes.free.sum()) - len(modes.axis))
     root = np.sqrt(np.repeat(body.length, b))[:, None]

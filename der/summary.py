@@ -12,8 +12,10 @@ def summary(path: Path) -> str:
     lines = [headline(path)]
     if path.mode is not None:
         lines.append(mode_in_words(path.mode))
-    elif path.status == "done":
+    elif path.status == "done" and len(path):
         lines.append(f"ends at gamma = {path.gamma[-1]:.6g}, before pi")
+    if path.status != "done":
+        lines.append(f"{path.status}: {path.message}")
     if path.points:
         lines += ["", f"{'':9}{'gamma':>12}{'gamma/pi':>10}{'M a/GJ':>12}{'U a/GJ':>12}  index"]
         lines += [_row(point) for point in path.points]
@@ -29,15 +31,19 @@ def summary(path: Path) -> str:
 
 def headline(path: Path) -> str:
     """Ring, section and mesh in one line."""
-    ring = ", ".join(
+    parameters = ", ".join(
         f"{name.replace('_over_', '/').replace('_', ' ')} {value:g}"
         for name, value in path.ring.items()
-        if isinstance(value, float)
+        if isinstance(value, int | float)
     )
+    ring = f"{path.ring['shape']} ({parameters})" if parameters else f"{path.ring['shape']}"
     section = f"alpha {path.section['alpha']:.6g}, beta {path.section['beta']:.6g}"
     if path.section.get("h_over_t") is not None:
-        section = f"h/t {path.section['h_over_t']:g}, nu {path.section['nu']:g} ({section})"
-    return f"{path.ring['shape']} ({ring}), {section}, {path.numerics['n_edges']} edges"
+        nu = path.section.get("nu")
+        given = "" if nu is None else f", nu {nu:g}"
+        section = f"h/t {path.section['h_over_t']:g}{given} ({section})"
+    edges = path.numerics.get("n_edges")  # a boundary-value solution has none
+    return f"{ring}, {section}" + ("" if edges is None else f", {edges} edges")
 
 
 def mode_in_words(mode: Mode) -> str:

@@ -54,12 +54,8 @@ def supports(
     ------
     ValueError
         Where an edge turns that is not clamped: its frame would be both free and prescribed.
-        Where a closed rod's edge 0 is not clamped: its frame must be held, by a grip or to take
-        out rigid rotations, since the factorisation cuts the cycle there.
     """
     n = body.n_edges
-    if body.closed and 0 not in clamped:
-        raise ValueError(f"clamped must hold edge 0 of a closed rod, got {clamped}")
     free = np.ones((n, body.block), dtype=bool)
     free[list(clamped)] = False
     rates = np.zeros(n)
@@ -79,3 +75,16 @@ def supports(
         np.array(turn_axis, dtype=float),
         force,
     )
+
+
+def check_cut(body: Rod, free: NDArray[np.bool_]) -> None:
+    """Make sure that a closed rod can be factored as a band.
+
+    Raises
+    ------
+    ValueError
+        Where the frame of its edge 0 is not held, by a grip or to take out rigid rotations: the
+        factorisation cuts the cycle there.
+    """
+    if body.closed and free[0, :3].any():
+        raise ValueError(f"free must hold the frame of edge 0 of a closed rod, got {free[0]}")

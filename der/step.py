@@ -1,0 +1,152 @@
+"""One accepted step of a path as a curve of equilibria.
+
+Between two neighbouring states the path is approximated by a cubic in s, the projection on the
+tangent at the start; the state at any s is the cubic's value, corrected orthogonally to that
+tangent. All that is sought within a step is a root in s, and what is found is an equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from der.equilibrium import (
+    ADVICE,
+    Control,
+    Direction,
+    Equilibrium,
+    dot,
+    equilibrium,
+    moved,
+    weights,
+)
+from der.frames import rotation_vector
+from der.sector import Sector
+
+ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
+
+
+class Stuck(RuntimeError):
+    """A path that cannot go on; everything found so far has been handed out before."""
+
+
+@dataclass
+class Tally:
+    """What the solve has cost so far."""
+
+    newton_iterations: int = 0
+    steps: int = 0
+
+
+@dataclass(frozen=True)
+class Step:
+    """The curve between two neighbouring states, s in [0, length]."""
+
+    piece: Sector
+    start: Equilibrium
+    end: Equilibrium
+    length: float
+    tolerance: float
+    tally: Tally
+    jump: Direction = field(init=False)
+    end_rate: Direction = field(init=False)
+
+    def __post_init__(self) -> None:
+        a, b = self.start, self.end
+        q = np.empty_like(a.tangent.q)
+        q[:, :3] = rotation_vector(a.state.quat, b.state.quat)
+        if q.shape[1] == 4:
+            q[:, 3] = b.state.stretch - a.state.stretch
+        q[~self.piece.held.free] = 0.0
+        jump = Direction(q, b.state.force - a.state.force, b.state.load - a.state.load)
+        # d/ds at the end, where s is measured along the tangent at the start
+        rate = 1.0 / dot(weights(self.piece.body), a.tangent, b.tangent)
+        t = b.tangent
+        object.__setattr__(self, "jump", jump)
+        object.__setattr__(self, "end_rate", Direction(t.q * rate, t.force * rate, t.load * rate))
+
+    def offset(self, s: float) -> Direction:
+        """Cubic increment from the start to ``s``."""
+        u = s / self.length
+        h10 = self.length * u * (1.0 - u) ** 2
+        h01 = u * u * (3.0 - 2.0 * u)
+        h11 = self.length * u * u * (u - 1.0)
+        a, d, b = self.start.tangent, self.jump, self.end_rate
+        return Direction(
+            h10 * a.q + h01 * d.q + h11 * b.q,
+            h10 * a.force + h01 * d.force + h11 * b.force,
+            h10 * a.load + h01 * d.load + h11 * b.load,
+        )
+
+    def at(self, s: float) -> Equilibrium:
+        """The equilibrium at ``s``.
+
+        Raises
+        ------
+        Stuck
+            Where Newton's method fails although both ends of the step are equilibria.
+        """
+        if s == 0.0:
+            return self.start
+        if s == self.length:
+            return self.end
+        return self._solved(s, self.offset(s), Control.DIRECTION)
+
+    def at_load(self, load: float, low: float, high: float) -> tuple[float, Equilibrium]:
+        """The equilibrium at ``load`` between s = low and high, where the load is monotonic."""
+
+        def cubic(s: float) -> float:
+            return self.start.state.load + self.offset(s).load - load
+
+        if cubic(low) * cubic(high) < 0.0:
+            s = root(cubic, low, high)
+            step = self.offset(s)
+            step = step._replace(load=load - self.start.state.load)
+            try:
+                found = self._solved(s, step, Control.LOAD)
+            except Stuck:
+                found = None
+            if found is not None and self._near(found, s):
+                return s, found
+        # close to a fold: the load is a bad coordinate there, s is not
+        s = root(lambda t: self.at(t).state.load - load, low, high)
+        found = self.at(s)
+        return s, replace(found, state=found.state.but(load=load))
+
+    def _near(self, found: Equilibrium, s: float) -> bool:
+        """Whether a state found at given load lies where the cubic expects it."""
+        mass = weights(self.piece.body)
+        q = rotation_vector(self.start.state.quat, found.state.quat)
+        q[~self.piece.held.free[:, :3]] = 0.0
+        away = float(np.sum(mass * (q - self.offset(s).q[:, :3]) ** 2)) ** 0.5
+        return away < 0.1 * self.length and found.tangent.load * self._load_rate(s) > 0.0
+
+    def _load_rate(self, s: float) -> float:
+        h = 1e-3 * self.length
+        return self.offset(s + h).load - self.offset(s - h).load
+
+    def _solved(self, s: float, step: Direction, control: Control) -> Equilibrium:
+        found = equilibrium(
+            self.piece.body,
+            self.piece.held,
+            moved(self.piece.held, self.start.state, step),
+            along=self.start.tangent,
+            control=control,
+            tolerance=self.tolerance,
+        )
+        self.tally.newton_iterations += found.iterations
+        if not found.converged:
+            raise Stuck(
+                f"no equilibrium within a step, at gamma = {self.start.state.load + step.load:.6f}"
+                f" (s = {s:.3g} of {self.length:.3g}): {ADVICE[found.outcome]}"
+            )
+        return found
+
+
+def root(f: Callable[[float], float], low: float, high: float) -> float:
+    """Root of ``f`` between two places where its signs differ (Brent)."""
+    from scipy.optimize import brentq
+
+    return float(brentq(f, low, high, xtol=ROOT, rtol=8.9e-16))
