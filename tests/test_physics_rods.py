@@ -91,7 +91,7 @@ def test_twisted_rod_buckles_at_greenhills_moment(measure, tolerance):
     """Straight, clamped at both ends, no tension: M L = 2 x EI with tan x = x, 8.986819 EI.
 
     Greenhill 1883; the far end slides along the axis. The mode may be turned about the axis, so the
-    index goes from 0 to 2. GJ matters for the angle only. Averaged frames ("angle", "tangent") weaken
+    index goes from 0 to 2. GJ matters for the angle only. Averaged frames (not "logarithm") weaken
     the bending of a twisted cell by cos(tau/2), which leaves 2.5e-6 after extrapolation.
     """
     GJ = 0.77
