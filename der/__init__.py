@@ -45,7 +45,6 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    # fold and section are functions and submodules of one name: the function is what users want
     for module, names in _HOME.items():
         if name in names:
             value = getattr(import_module(f"der.{module}"), name)

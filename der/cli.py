@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from der.sections import Section
 
 SHAPES = ("circle",)
+NU = 0.3  # Poisson's ratio where none is given
 UNSAVED = File("der-unfinished.json")  # where an unfinished path goes if no file was named
 OUTPUT = File("-")  # standard output
 
@@ -131,7 +132,7 @@ def fold(
     ] = None,
     nu: Annotated[
         float, typer.Option(parser=_number, help="Poisson's ratio, with --h-over-t.")
-    ] = 0.3,
+    ] = NU,
     natural_curvature: Annotated[
         float,
         typer.Option(parser=_number, help="Natural curvature of the circle, in units of 1/a."),
@@ -216,6 +217,8 @@ def _section(h_over_t: float | None, alpha: float | None, beta: float | None, nu
     """The section that the command line describes."""
     from der.sections import rectangular_section, section
 
+    if h_over_t is None and nu != NU:
+        raise ValueError(f"nu can only be given together with --h-over-t, got {nu}")
     if h_over_t is not None:
         if alpha is not None or beta is not None:
             raise ValueError(
@@ -268,6 +271,8 @@ def _targets(json: str | None, plot: str | None, out: str | None) -> dict[str, F
         if File(plot).suffix not in FORMATS:
             raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
         targets["plot"] = File(plot)
+    if targets.get("json") in [targets[name] for name in ("plot", "shapes") if name in targets]:
+        raise ValueError(f"json must be a file of its own, got {json!r} twice")
     for name, file in targets.items():
         if file != OUTPUT:
             _check_writable(name if name != "shapes" else "out", file)
@@ -318,10 +323,10 @@ def _fold(scene: Scene, targets: dict[str, File], *, quiet: bool) -> int:
 
 def _whereabouts(path: Path, file: File) -> str:
     """Where an unfinished path went, and how far it got."""
-    place = "standard output" if file == OUTPUT else str(file)
+    place = "on standard output" if file == OUTPUT else f"in {file}"
     if not len(path):
-        return f"the record, without any state, is in {place}"
-    return f"the path up to its last good state, at gamma = {path.gamma[-1]:.8g}, is in {place}"
+        return f"the record, without any state, is {place}"
+    return f"the path up to its last good state, at gamma = {path.gamma[-1]:.8g}, is {place}"
 
 
 @contextmanager

@@ -228,12 +228,11 @@ def _residual(held, system, control, moment):
 def _normalise(rod, system, column, x, y, z):
     """Scale a tangent in place to unit mass-weighted norm; returns d(dL/dload) along it."""
     n, b, _ = x.shape
-    total, norm = 0.0, 0.0
+    norm = z[0] * z[0]
     for j in range(n):
-        total += rod.length[j]
         for i in range(b):
-            norm += rod.length[j] * x[j, i, 0] ** 2
-    scale = 1.0 / np.sqrt(norm / total + z[0] * z[0])
+            norm += rod.mass[j, 0] * x[j, i, 0] ** 2
+    scale = 1.0 / np.sqrt(norm)
     z[0] *= scale
     rate = system.load_hess * z[0]
     for j in range(n):
@@ -268,14 +267,12 @@ def _move(held, quat, stretch, force, dq, dforce, dload):
         force[k] += dforce[k, 0]
 
 
-def weights(body: Rod) -> Array:
-    """Mass-weights (n, 1) of the edges in the norm of directions: they sum to 1."""
-    return (body.length / body.length.sum())[:, None]
+def dot(body: Rod, a: Direction, b: Direction) -> float:
+    """Inner product of two directions, mass-weighted and so independent of the mesh.
 
-
-def dot(mass: Array, a: Direction, b: Direction) -> float:
-    """Inner product of two directions, independent of the mesh; forces do not enter."""
-    return float(np.sum(mass * a.q * b.q) + a.load * b.load)
+    Forces do not enter.
+    """
+    return float(np.sum(body.mass * a.q * b.q) + a.load * b.load)
 
 
 def moved(held: Supports, state: State, step: Direction) -> State:
@@ -318,7 +315,7 @@ def equilibrium(
     if along is None:
         row, row_load = np.zeros(held.free.shape), 1.0
     else:
-        row, row_load = weights(body) * along.q, along.load
+        row, row_load = body.mass * along.q, along.load
     c = _correct(
         body,
         held,

@@ -20,7 +20,7 @@ from der.rod import State
 from der.scene import Scene
 from der.sections import section
 from der.sector import Sector, free_ring, sector
-from der.special import Visit, Wanted, three_covered
+from der.special import Indices, Visit, Wanted, three_covered
 from der.stability import all_modes, index
 from der.step import Stuck, Tally
 
@@ -134,9 +134,9 @@ def _record(
     message: str,
 ) -> Path:
     """The record of what was visited."""
-    indices = [_full_index(piece, visit) for visit in visits]
+    indices = [_full_index(piece, visit.index) for visit in visits]
     moments = np.array([piece.moment(visit.at.moment) for visit in visits])
-    points = tuple(_points(piece, visits, indices))
+    points = tuple(_points(piece, visits))
     at_pi = mode = None
     for k, visit in enumerate(visits):
         if visit.at.state.load == math.pi:
@@ -172,18 +172,18 @@ def _record(
         mode=mode,
         error=None,
         timing=timing,
-        shapes=_shapes(piece, visits) if scene.shapes else None,
+        shapes=_shapes(piece, visits) if scene.shapes and visits else None,
         status=status,
         message=message,
     )
 
 
-def _full_index(piece: Sector, visit: Visit) -> int | None:
+def _full_index(piece: Sector, index: Indices | None) -> int | None:
     """Index of the full ring: the sum over the classes, pairs counted twice."""
-    if visit.index is None:
+    if index is None:
         return None
     total = 0
-    for (multiplicity, _), count in zip(piece.classes.values(), visit.index, strict=True):
+    for (multiplicity, _), count in zip(piece.classes.values(), index, strict=True):
         if count is None:
             return None
         total += multiplicity * count
@@ -197,16 +197,15 @@ def _moment_index(visit: Visit, held: int | None) -> int | None:
     return held + (visit.at.slope < 0.0)
 
 
-def _points(piece: Sector, visits: list[Visit], indices: list[int | None]) -> list[Point]:
+def _points(piece: Sector, visits: list[Visit]) -> list[Point]:
     """The special points, with the index on their two sides."""
     points = []
     for k, visit in enumerate(visits):
         if not visit.kind:
             continue
-        before = after = indices[k]
-        if before is None:  # a fold or a branch: the index is that of its neighbours
-            before = next((i for i in reversed(indices[:k]) if i is not None), None)
-            after = next((i for i in indices[k + 1 :] if i is not None), None)
+        before, after = (
+            _full_index(piece, index) for index in visit.sides or (visit.index, visit.index)
+        )
         at = visit.at
         numbers = (at.state.load, piece.moment(at.moment), piece.copies * at.energy)
         points.append(Point(visit.kind, *numbers, before, after, k, visit.details))

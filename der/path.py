@@ -17,7 +17,6 @@ from der.equilibrium import (
     dot,
     equilibrium,
     moved,
-    weights,
 )
 from der.sector import Sector
 from der.special import Visit, Wanted, special_points, visit
@@ -28,6 +27,7 @@ LARGEST_STEP = 0.6
 SMALLEST_STEP = 1e-7
 _ANGLE = 0.12  # rad, aimed at between tangents of neighbouring states
 _SHARPEST = 0.6  # rad, a step that turns more is repeated shorter
+_STRAIGHT = 0.01  # bulge of a step that is believed although its ends are oriented unequally
 
 
 def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
@@ -52,6 +52,14 @@ def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
         if tally.steps >= wanted.most_steps:
             raise Stuck(f"the path has not ended after {tally.steps} steps")
         step = _advance(piece, wanted, tally, here.at, bend, length)
+        try:
+            found, ended = special_points(piece, wanted, step, here)
+        except Stuck:
+            # both ends are equilibria, but not of one smooth curve: look again from closer
+            if step.length < 4.0 * SMALLEST_STEP:
+                raise
+            length = 0.25 * step.length
+            continue
         tally.steps += 1
         angle = _between(piece, here.at, step.end)
         bend = Direction(
@@ -59,11 +67,12 @@ def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
             (step.end.tangent.force - here.at.tangent.force) / step.length,
             (step.end.tangent.load - here.at.tangent.load) / step.length,
         )
-        found, ended = special_points(piece, wanted, step, here)
         yield from found
         here = found[-1]
         if ended:
             return
+        if here.at.state.load < -wanted.load_max:
+            raise Stuck(f"the path has turned back to gamma = {here.at.state.load:.6f}")
         ease = math.sqrt(_ANGLE / max(angle, 1e-3))
         if step.end.iterations > 4:
             ease = min(ease, 0.7)
@@ -72,7 +81,16 @@ def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
 
 def _between(piece: Sector, a: Equilibrium, b: Equilibrium) -> float:
     """Angle between the tangents at two states [rad]."""
-    return math.acos(min(1.0, max(-1.0, dot(weights(piece.body), a.tangent, b.tangent))))
+    return math.acos(min(1.0, max(-1.0, dot(piece.body, a.tangent, b.tangent))))
+
+
+def _one_way(at: Equilibrium) -> bool:
+    """Orientation of a path: a fold changes the sign of dgamma/ds and the index, and so keeps it.
+
+    The determinant of the augmented matrix does not vanish along a path but where another
+    branches off (Keller); two states of unequal sign otherwise lie on two strands of it.
+    """
+    return (at.negative % 2 == 0) == (at.tangent.load > 0.0)
 
 
 def _advance(
@@ -96,7 +114,7 @@ def _advance(
                 guess.load + half * bend.load,
             )
             # s is the projection on the tangent, which the second-order term must not change
-            excess = dot(weights(piece.body), t, guess) - length
+            excess = dot(piece.body, t, guess) - length
             guess = Direction(
                 guess.q - excess * t.q, guess.force - excess * t.force, guess.load - excess * t.load
             )
@@ -111,7 +129,9 @@ def _advance(
         )
         tally.newton_iterations += end.iterations
         if end.converged and _between(piece, start, end) < _SHARPEST:
-            return Step(piece, start, end, length, wanted.tolerance, tally)
+            step = Step(piece, start, end, length, wanted.tolerance, tally)
+            if _one_way(start) == _one_way(end) or step.bulge < _STRAIGHT:
+                return step
         reason = ADVICE[end.outcome] if not end.converged else "the path turns too sharply"
         if end.where >= 0:
             reason = f"vertex {end.where} {reason}"

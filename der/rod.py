@@ -27,6 +27,7 @@ class Rod(NamedTuple):
 
     cell: Array  # (n_s,) Voronoi length of each vertex
     length: Array  # (n,) rest length of each edge
+    mass: Array  # (n, 1) the same over their sum: weights of the edges in norms
     rest: Array  # (n_s, 3) natural integrated strains kappa1, kappa2, twist [rad]
     stiffness: Array  # (3,) EI1, EI2, GJ
     stretching: float  # EA; 0 where the rod is inextensible
@@ -105,7 +106,8 @@ def rod(
     else:
         length = 0.5 * (np.append(cell, 0.0) + np.append(0.0, cell))
     number = MEASURES.index(measure)
-    return Rod(cell, length, strains, np.array(stiffness), stretching, number, bool(closed))
+    mass = (length / length.sum())[:, None]
+    return Rod(cell, length, mass, strains, np.array(stiffness), stretching, number, bool(closed))
 
 
 def edges(body: Rod, state: State) -> Array:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass
+from numbers import Integral
 
-from der.checks import checked_number, one_of, positive
+from der.checks import checked_number, one_of, positive, truth
 from der.ring import Ring
 from der.sections import Section
 
@@ -16,6 +17,7 @@ COPIES = {"full": 1, "half": 2, "quarter": 4}  # how many of a sector make the r
 
 FEWEST_EDGES = 8
 MOST_EDGES = 65_536
+THINNEST = 1e6  # a/t; beyond, EA drowns bending in rounding
 CONTACTS_UP_TO = 1024  # edges; the writhe that finds contacts costs O(N^2)
 
 
@@ -72,22 +74,35 @@ class Scene:
                 f"section must be a der.Section such as der.rectangular_section(4.0), "
                 f"got {self.section!r}"
             )
+        object.__setattr__(self, "n_edges", _whole("n_edges", self.n_edges))
         sector_name(self.ring, self.sector, self.n_edges)
+        for name in ("stability", "shapes"):
+            object.__setattr__(self, name, truth(name, getattr(self, name)))
+        if self.contacts is not None:
+            object.__setattr__(self, "contacts", truth("contacts", self.contacts))
         one_of("curvature", self.curvature, MEASURES)
         one_of("stretch", self.stretch, STRETCH)
         if self.until is not None:
             one_of("until", self.until, ("folded",))
         positive("gamma_max", self.gamma_max)
         positive("a_over_t", self.a_over_t)
+        if self.a_over_t > THINNEST:
+            raise ValueError(f"a_over_t must be at most {THINNEST:g}, got {self.a_over_t!r}")
         positive("tolerance", self.tolerance)
         if self.tolerance > 1e-4:
             raise ValueError(f"tolerance must be at most 1e-4, got {self.tolerance!r}")
+        if self.until == "folded" and self.gamma_max < math.pi:
+            raise ValueError(
+                f"gamma_max must be at least pi where until is 'folded', got {self.gamma_max!r}"
+            )
         if self.save_at is not None:
             self._check_save_at(self.save_at)
 
     def _check_save_at(self, values: Sequence[float]) -> None:
         last = math.inf if self.until == "folded" else self.gamma_max
         allowed = "numbers >= 0" if last == math.inf else f"numbers from 0 to gamma_max = {last}"
+        if isinstance(values, str) or not isinstance(values, Iterable):
+            raise ValueError(f"save_at must be a sequence of {allowed}, got {values!r}")
         gammas = {
             checked_number("save_at", gamma, allowed, lambda g: 0.0 <= g <= last)
             for gamma in values
@@ -114,8 +129,6 @@ def sector_name(ring: Ring, name: str, n_edges: int) -> str:
         Naming the argument, its value and what is allowed.
     """
     one_of("sector", name, ("auto", *COPIES))
-    if isinstance(n_edges, bool) or not isinstance(n_edges, int):
-        raise ValueError(f"n_edges must be a whole number, got {n_edges!r}")
     if name == "auto":
         name = "quarter" if ring.symmetry == "D2" else "half"
     if name == "quarter" and ring.symmetry != "D2":
@@ -127,3 +140,9 @@ def sector_name(ring: Ring, name: str, n_edges: int) -> str:
             f" for the sector {name!r}, got {n_edges}"
         )
     return name
+
+
+def _whole(name: str, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ValueError(f"{name} must be a whole number, got {value!r}")
+    return int(value)

@@ -25,13 +25,17 @@ _CONTACT = 1e-5  # of s, for the passage of a strand
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 
 
+Indices = tuple[int | None, ...]  # by symmetry class, multiplicities not yet applied
+
+
 @dataclass(frozen=True)
 class Visit:
     """A state on the path, as it is handed out."""
 
     at: Equilibrium
     kind: str = ""  # "", "fold", "limit", "branch" or "contact"
-    index: tuple[int | None, ...] | None = None  # by class, multiplicities not yet applied
+    index: Indices | None = None
+    sides: tuple[Indices, Indices] | None = None  # index before and after a singular state
     link: int | None = None
     details: Mapping[str, object] = field(default_factory=dict)
 
@@ -65,7 +69,6 @@ class _Mark:
 
     s: float
     visit: Visit
-    shown: bool = True
 
 
 def special_points(
@@ -85,27 +88,35 @@ def special_points(
         line = _index_changes(piece, wanted, step, line)
     if wanted.contacts:
         line = _passages(piece, wanted, step, line, ended)
-    return [m.visit for m in line[1:] if m.shown], ended
+    return [m.visit for m in line[1:]], ended
 
 
 def _folds(step: Step) -> list[tuple[float, Equilibrium]]:
     """Folds of the load within a step, also a pair of them between tangents of equal sign."""
-    a, b = step.start.tangent.load, step.end_rate.load
-    cuts = [0.0, step.length]
-    if a * b > 0.0:
-        # the cubic load(s) has its slowest point inside: look there before trusting the signs
-        c3 = a + b - 2.0 * step.jump.load / step.length
-        c2 = 3.0 * step.jump.load / step.length - 2.0 * a - b
-        u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
-        if 0.0 < u < 1.0 and (a + 2.0 * c2 * u + 3.0 * c3 * u * u) * a < 0.1 * a * a:
-            cuts.insert(1, u * step.length)
-    rates = [step.at(s).tangent.load for s in cuts]
+    rates = (step.start.tangent.load, step.end_rate.load)
+    cuts = [0.0, *_slowest(step.length, step.jump.load, *rates), step.length]
     found = []
-    for (s0, r0), (s1, r1) in pairwise(zip(cuts, rates, strict=True)):
-        if r0 * r1 < 0.0:
+    for s0, s1 in pairwise(cuts):
+        if step.at(s0).tangent.load * step.at(s1).tangent.load < 0.0:
             s = root(lambda t: step.at(t).tangent.load, s0, s1)
             found.append((s, step.at(s)))
     return found
+
+
+def _slowest(length: float, jump: float, first: float, last: float) -> list[float]:
+    """Where a cubic's rate is smallest between two equal signs, if it may change sign there.
+
+    Two turns that lie close together show at the ends of an interval only by this.
+    """
+    if first * last <= 0.0:
+        return []
+    c2 = 3.0 * jump / length - 2.0 * first - last
+    c3 = first + last - 2.0 * jump / length
+    u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
+    if not 0.0 < u < 1.0:
+        return []
+    rate = first + (2.0 * c2 + 3.0 * c3 * u) * u
+    return [u * length] if rate * first < 0.1 * first * first else []
 
 
 def _at_targets(
@@ -154,44 +165,64 @@ def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
     """Limits of the moment between the marks of a line."""
     found = []
     for a, b in pairwise(line):
-        if a.visit.at.moment_rate * b.visit.at.moment_rate < 0.0:
-            s = root(lambda t: step.at(t).moment_rate, a.s, b.s)
-            found.append(_Mark(s, Visit(step.at(s), "limit")))
+        first, last = a.visit.at, b.visit.at
+        inside = _slowest(
+            b.s - a.s, last.moment - first.moment, first.moment_rate, last.moment_rate
+        )
+        for s0, s1 in pairwise([a.s, *(a.s + u for u in inside), b.s]):
+            if step.at(s0).moment_rate * step.at(s1).moment_rate < 0.0:
+                s = root(lambda t: step.at(t).moment_rate, s0, s1)
+                found.append(_Mark(s, Visit(step.at(s), "limit")))
     return found
 
 
 def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark]) -> list[_Mark]:
-    """The line with branch points put in, and with the index of limits filled in."""
+    """The line with branch points put in, the index of limits, and that beside folds."""
     line = [
         replace(m, visit=visit(piece, wanted, m.visit.at, kind="limit"))
         if m.visit.kind == "limit"
         else m
         for m in line
     ]
-    # a fold explains one change of the first class: look at its flanks, and then between them
-    flank = _FLANK * step.length
-    known: list[_Mark] = []
-    for m in line:
-        if m.visit.kind == "fold":
-            known += [
-                _Mark(s, visit(piece, wanted, step.at(s)), shown=False)
-                for s in (m.s - flank, m.s + flank)
-                if 0.0 < s < line[-1].s
-            ]
-        else:
-            known.append(m)
-    known = [m for m in known if m.visit.index is not None and None not in m.visit.index]
-    known.sort(key=lambda m: m.s)
     folds = [m.s for m in line if m.visit.kind == "fold"]
-    found = []
-    for a, b in pairwise(known):
-        if any(a.s < s < b.s for s in folds):
-            continue
-        for c, (before, after) in enumerate(
-            zip(a.visit.index or (), b.visit.index or (), strict=True)
-        ):
-            found += _branches(piece, step, c, (a.s, before), (b.s, after))
-    return sorted([*line, *(m for m in known if not m.shown), *found], key=lambda m: m.s)
+    flanks = [s for fold in folds for s in _beside(step, fold, folds, line[-1].s)]
+    known = [m for m in line if m.visit.kind != "fold"]
+    known += [_Mark(s, visit(piece, wanted, step.at(s))) for s in flanks]
+    known = [m for m in known if m.visit.index is not None and None not in m.visit.index]
+    found: list[_Mark] = []
+    for a, b in pairwise(sorted(known, key=lambda m: m.s)):
+        # across a fold, the first class loses or gains one by the fold itself
+        first = 1 if any(a.s < s < b.s for s in folds) else 0
+        for c in range(first, len(piece.classes)):
+            ends = ((m.s, (m.visit.index or ())[c]) for m in (a, b))
+            found += _branches(piece, step, c, *ends)
+    line = sorted([*line, *found], key=lambda m: m.s)
+    singular = [m.s for m in line if m.visit.kind in ("fold", "branch")]
+    return [
+        replace(m, visit=_with_sides(piece, wanted, step, m, singular, line[-1].s))
+        if m.visit.kind in ("fold", "branch")
+        else m
+        for m in line
+    ]
+
+
+def _beside(step: Step, s: float, singular: list[float], end: float) -> tuple[float, float]:
+    """Places shortly before and after ``s``, nearer to it than to other singular states."""
+    apart = 1e-6 * step.length  # what lies closer is the same state
+    low = max((t for t in singular if t < s - apart), default=0.0)
+    high = min((t for t in singular if t > s + apart), default=end)
+    flank = _FLANK * step.length
+    return s - min(flank, 0.5 * (s - low)), s + min(flank, 0.5 * (high - s))
+
+
+def _with_sides(
+    piece: Sector, wanted: Wanted, step: Step, mark: _Mark, singular: list[float], end: float
+) -> Visit:
+    """A singular state with the index on its two sides."""
+    before, after = (
+        visit(piece, wanted, step.at(s)).index for s in _beside(step, mark.s, singular, end)
+    )
+    return replace(mark.visit, sides=None if before is None or after is None else (before, after))
 
 
 def _branches(
@@ -245,7 +276,7 @@ def _contacts(
         found = visit(piece, wanted, at, kind="contact", link=high[1], details=change)
         return [_Mark(low[0], found)]
     s = 0.5 * (low[0] + high[0])
-    middle = (s, piece.link(step.at(s).state))
+    middle = (s, piece.link(step.near(s)))
     return [
         *_contacts(piece, wanted, step, low, middle),
         *_contacts(piece, wanted, step, middle, high),

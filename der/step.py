@@ -20,9 +20,9 @@ from der.equilibrium import (
     dot,
     equilibrium,
     moved,
-    weights,
 )
 from der.frames import rotation_vector
+from der.rod import State
 from der.sector import Sector
 
 ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
@@ -62,7 +62,7 @@ class Step:
         q[~self.piece.held.free] = 0.0
         jump = Direction(q, b.state.force - a.state.force, b.state.load - a.state.load)
         # d/ds at the end, where s is measured along the tangent at the start
-        rate = 1.0 / dot(weights(self.piece.body), a.tangent, b.tangent)
+        rate = 1.0 / dot(self.piece.body, a.tangent, b.tangent)
         t = b.tangent
         object.__setattr__(self, "jump", jump)
         object.__setattr__(self, "end_rate", Direction(t.q * rate, t.force * rate, t.load * rate))
@@ -80,6 +80,12 @@ class Step:
             h10 * a.load + h01 * d.load + h11 * b.load,
         )
 
+    @property
+    def bulge(self) -> float:
+        """How far the end lies beside the tangent at the start, over the length."""
+        square = dot(self.piece.body, self.jump, self.jump)
+        return max(square / self.length**2 - 1.0, 0.0) ** 0.5
+
     def at(self, s: float) -> Equilibrium:
         """The equilibrium at ``s``.
 
@@ -93,6 +99,18 @@ class Step:
         if s == self.length:
             return self.end
         return self._solved(s, self.offset(s), Control.DIRECTION)
+
+    def near(self, s: float) -> State:
+        """A state near the equilibrium at ``s``: the cubic with one correction, half the price."""
+        return equilibrium(
+            self.piece.body,
+            self.piece.held,
+            moved(self.piece.held, self.start.state, self.offset(s)),
+            along=self.start.tangent,
+            control=Control.DIRECTION,
+            tolerance=0.0,
+            iterations=1,
+        ).state
 
     def at_load(self, load: float, low: float, high: float) -> tuple[float, Equilibrium]:
         """The equilibrium at ``load`` between s = low and high, where the load is monotonic."""
@@ -117,10 +135,9 @@ class Step:
 
     def _near(self, found: Equilibrium, s: float) -> bool:
         """Whether a state found at given load lies where the cubic expects it."""
-        mass = weights(self.piece.body)
         q = rotation_vector(self.start.state.quat, found.state.quat)
         q[~self.piece.held.free[:, :3]] = 0.0
-        away = float(np.sum(mass * (q - self.offset(s).q[:, :3]) ** 2)) ** 0.5
+        away = float(np.sum(self.piece.body.mass * (q - self.offset(s).q[:, :3]) ** 2)) ** 0.5
         return away < 0.1 * self.length and found.tangent.load * self._load_rate(s) > 0.0
 
     def _load_rate(self, s: float) -> float:

@@ -49,13 +49,15 @@ class Row:
 def run(file: Path | None = None, *, quick: bool = False) -> list[Row]:
     """Measure everything, print a table as it grows, and write JSON if ``file`` is given."""
     print(f"der {version('ring-origami')}, {machine()}")
-    rows = []
-    for row in measure(quick=quick):
-        rows.append(row)
-        print(_line(row))
-    if file is not None:
-        record = {"machine": machine(), "rows": [asdict(row) for row in rows]}
-        file.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+    rows: list[Row] = []
+    try:
+        for row in measure(quick=quick):
+            rows.append(row)
+            print(_line(row), flush=True)
+    finally:  # Ctrl-C keeps the rows it has
+        if file is not None:
+            record = {"machine": machine(), "rows": [asdict(row) for row in rows]}
+            file.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
     return rows
 
 
