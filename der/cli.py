@@ -312,7 +312,7 @@ def _fold(scene: Scene, targets: dict[str, File], *, quiet: bool) -> int:
     if not _write(path, targets):
         code = code or 3
     if path.status != "done":
-        _say(f"der: {path.message}; {_whereabouts(path, targets['json'])}")
+        _say(f"der: {path.message}; {_whereabouts(path, targets)}")
     if not quiet and targets.get("json") != OUTPUT:
         from der.summary import summary
 
@@ -321,12 +321,16 @@ def _fold(scene: Scene, targets: dict[str, File], *, quiet: bool) -> int:
     return code
 
 
-def _whereabouts(path: Path, file: File) -> str:
+def _whereabouts(path: Path, targets: dict[str, File]) -> str:
     """Where an unfinished path went, and how far it got."""
+    file = targets["json"]
     place = "on standard output" if file == OUTPUT else f"in {file}"
     if not len(path):
         return f"the record, without any state, is {place}"
-    return f"the path up to its last good state, at gamma = {path.gamma[-1]:.8g}, is {place}"
+    last = f"at gamma = {path.gamma[-1]:.8g}"
+    return (
+        f"the path up to its last good state, {last}, is {place}, its shapes in {targets['shapes']}"
+    )
 
 
 @contextmanager

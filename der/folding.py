@@ -172,7 +172,8 @@ def _record(
         mode=mode,
         error=None,
         timing=timing,
-        shapes=_shapes(piece, visits) if scene.shapes and visits else None,
+        # an unfinished path keeps its shapes in any case: they are what it got to
+        shapes=_shapes(piece, visits) if visits and (scene.shapes or status != "done") else None,
         status=status,
         message=message,
     )

@@ -504,7 +504,7 @@ def test_a_path_that_gets_stuck_saves_what_it_has(run):
     assert (code, out) == (3, "")
     assert err == [
         f"der: {path.message}; the path up to its last good state, "
-        f"at gamma = {path.gamma[-1]:.8g}, is in f.json"
+        f"at gamma = {path.gamma[-1]:.8g}, is in f.json, its shapes in f.npz"
     ]
     assert (path.status, path.timing.steps) == ("not converged", 6)
 
@@ -514,7 +514,7 @@ def test_without_a_named_file_the_rest_is_saved_in_the_working_directory(run, fo
     """der-unfinished.json, so that nothing computed is lost."""
     code, _, err = run(*SMALL, "--quiet")
     assert code == 3
-    assert err[0].endswith("is in der-unfinished.json")
+    assert err[0].endswith("is in der-unfinished.json, its shapes in der-unfinished.npz")
     assert [f.name for f in folder.iterdir()] == ["der-unfinished.json"]
     assert len(saved()) > 6
 
@@ -531,7 +531,7 @@ def test_an_unfinished_record_for_output_is_alone_there(run, folder):
     """`--json -`: the record, and nothing else, on standard output; no file is made."""
     code, out, err = run(*SMALL, "--json", "-")
     assert code == 3
-    assert err[0].endswith("is on standard output")
+    assert err[0].endswith("is on standard output, its shapes in der-unfinished.npz")
     assert entries(out)["status"] == "not converged"
     assert not list(folder.iterdir())
 
@@ -571,7 +571,7 @@ def test_ctrl_c_saves_what_there_is(run):
     assert (code, out, path.status, len(path)) == (130, "", "interrupted", 5)
     assert err == [
         "der: stopped by the user; the path up to its last good state, "
-        f"at gamma = {path.gamma[-1]:.8g}, is in f.json"
+        f"at gamma = {path.gamma[-1]:.8g}, is in f.json, its shapes in f.npz"
     ]
 
 
@@ -598,7 +598,7 @@ def test_on_a_full_disk_an_unfinished_record_is_not_said_to_be_in_its_file(run, 
     monkeypatch.setattr(Path, "save", full)
     code, out, err = run(*SMALL, "--json", "f.json")
     assert code == 3
-    assert err[-1].endswith("is on standard output")
+    assert err[-1].endswith("is on standard output, its shapes in f.npz")
     assert entries(out)["status"] == "not converged"
 
 
