@@ -102,7 +102,7 @@ class Step:
 
     def near(self, s: float) -> State:
         """A state near the equilibrium at ``s``: the cubic with one correction, half the price."""
-        return equilibrium(
+        found = equilibrium(
             self.piece.body,
             self.piece.held,
             moved(self.piece.held, self.start.state, self.offset(s)),
@@ -110,7 +110,9 @@ class Step:
             control=Control.DIRECTION,
             tolerance=0.0,
             iterations=1,
-        ).state
+        )
+        self.tally.newton_iterations += found.iterations
+        return found.state
 
     def at_load(self, load: float, low: float, high: float) -> tuple[float, Equilibrium]:
         """The equilibrium at ``load`` between s = low and high, where the load is monotonic."""
