@@ -164,6 +164,9 @@ def fold(
     stability: Annotated[
         bool, typer.Option("--stability/--no-stability", help="Index of the full ring.")
     ] = True,
+    error_bars: Annotated[
+        bool, typer.Option("--error-bars", help="Extrapolate from N, N/2, N/4 edges, with errors.")
+    ] = False,
     sector: Annotated[str, typer.Option(help="auto, full, half or quarter.")] = "auto",
     json: Annotated[
         str | None, typer.Option(metavar="F", help="Write the record here ('-': output).")
@@ -189,6 +192,7 @@ def fold(
             n_edges=edges,
             sector=sector,
             stability=stability,
+            error_bars=error_bars,
             shapes=plot is not None or out is not None,
             gamma_max=gamma_max,
             until=until,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
@@ -13,14 +13,15 @@ import numpy as np
 
 from der.assembly import assemble
 from der.checks import counts
+from der.error_bars import error_bars
 from der.path import follow
 from der.record import AtPi, Path, Point, Shapes, Timing, folding_mode
 from der.ring import circle
 from der.rod import State
-from der.scene import Scene
+from der.scene import Scene, meshes
 from der.sections import section
 from der.sector import Sector, free_ring, sector
-from der.special import Indices, Visit, Wanted, three_covered
+from der.special import EIGHTH, Indices, Visit, Wanted, three_covered
 from der.stability import all_modes, index
 from der.step import Stuck, Tally
 
@@ -78,14 +79,7 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
     """
     if scene.ring.shape != "circle":
         raise ValueError(f"ring must be a circle (der.circle), got a {scene.ring.shape}")
-    piece = sector(
-        scene.ring,
-        scene.section,
-        scene.n_edges,
-        name=scene.sector,
-        measure=scene.curvature,
-        stretching=scene.stretching,
-    )
+    piece = _piece(scene, scene.n_edges, scene.sector)
     until_folded = scene.until == "folded"
     beyond = scene.gamma_max > math.pi
     wanted = Wanted(
@@ -114,7 +108,61 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
         raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
     except KeyboardInterrupt:
         raise Interrupted(record("interrupted", "stopped by the user")) from None
+    if scene.error_bars:
+        return _with_error_bars(scene, piece, visits, record)
     return record("done")
+
+
+def _piece(scene: Scene, n_edges: int, name: str) -> Sector:
+    """A sector of the scene's ring with ``n_edges`` edges in the full ring."""
+    return sector(
+        scene.ring,
+        scene.section,
+        n_edges,
+        name=name,
+        measure=scene.curvature,
+        stretching=scene.stretching,
+    )
+
+
+def _with_error_bars(
+    scene: Scene, piece: Sector, visits: list[Visit], record: Callable[[str], Path]
+) -> Path:
+    """The record with the values extrapolated from three meshes, and their errors.
+
+    Indices, and the mode but for its slope, are those of the scene's own mesh.
+    """
+    coarse = [_piece(scene, n, piece.name) for n in meshes(scene.n_edges, piece.name)[1:]]
+    asked = {math.pi, scene.gamma_max}
+    if scene.save_at is not None:
+        asked |= set(scene.save_at)
+    else:
+        last = max(abs(visit.at.state.load) for visit in visits)
+        most = math.ceil(last / EIGHTH)
+        asked |= {k * EIGHTH for k in range(-most, most + 1)}
+    bars = error_bars([piece, *coarse], visits, asked, tolerance=scene.tolerance)
+    visits[:] = [visits[k] for k in bars.order]
+    path = record("done")
+
+    def at(k: int) -> dict[str, float]:
+        return {name: float(getattr(bars, name)[k]) for name in ("gamma", "moment", "energy")}
+
+    at_pi, mode = path.at_pi, path.mode
+    if at_pi is not None and mode is not None and bars.slope is not None:
+        now = at(bars.gamma.tolist().index(math.pi))
+        at_pi = replace(at_pi, moment=now["moment"], energy=now["energy"], slope=bars.slope)
+        mode = replace(mode, stable=bars.slope > 0.0 if mode.foldable else None)
+    return replace(
+        path,
+        gamma=bars.gamma,
+        moment=bars.moment,
+        energy=bars.energy,
+        points=tuple(replace(point, **at(point.position)) for point in path.points),  # type: ignore[arg-type]
+        at_pi=at_pi,
+        mode=mode,
+        error=bars.error,
+        raw=bars.raw,
+    )
 
 
 @cache
@@ -215,14 +263,7 @@ def _points(piece: Sector, visits: list[Visit]) -> list[Point]:
 
 def _free_index(scene: Scene, piece: Sector, visit: Visit) -> int | None:
     """Index of the ring with its grips removed, rigid motions taken out, if it stays at rest."""
-    whole = sector(
-        scene.ring,
-        scene.section,
-        scene.n_edges,
-        name="full",
-        measure=scene.curvature,
-        stretching=scene.stretching,
-    )
+    whole = _piece(scene, scene.n_edges, "full")
     held = free_ring(whole.body)
     quat = piece.full_frames(visit.at.state)
     stretch = piece.full_lengths(visit.at.state) / whole.body.length - 1.0
@@ -258,6 +299,7 @@ def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
         "tolerance": scene.tolerance,
         "gamma_max": scene.gamma_max,
         "until": scene.until,
+        "error_bars": scene.error_bars,
         "save_at": None if scene.save_at is None else list(scene.save_at),
         "stability": scene.stability,
         "version": release,

@@ -34,6 +34,9 @@ class Scene:
         ring's symmetry allows.
     stability : whether to compute the index of the full ring at every state.
     contacts : whether to look for passages of a strand through another; None: up to 1024 edges.
+    error_bars : whether to solve on a half and a quarter of the edges, too, and to extrapolate:
+        the path then holds extrapolated values with their errors. From 32 edges on, divisible by
+        16 on a quarter and by 8 otherwise.
     shapes : whether to keep vertices and frames of every state.
     gamma_max : the path ends at its first arrival there [rad].
     until : "folded": go on, beyond pi and back, until the three-covered state at pi is reached;
@@ -57,6 +60,7 @@ class Scene:
     sector: str = "auto"
     stability: bool = True
     contacts: bool | None = None
+    error_bars: bool = False
     shapes: bool = False
     gamma_max: float = math.pi
     until: str | None = None
@@ -76,8 +80,10 @@ class Scene:
             )
         object.__setattr__(self, "n_edges", _whole("n_edges", self.n_edges))
         sector_name(self.ring, self.sector, self.n_edges)
-        for name in ("stability", "shapes"):
+        for name in ("stability", "error_bars", "shapes"):
             object.__setattr__(self, name, truth(name, getattr(self, name)))
+        if self.error_bars:
+            meshes(self.n_edges, sector_name(self.ring, self.sector, self.n_edges))
         if self.contacts is not None:
             object.__setattr__(self, "contacts", truth("contacts", self.contacts))
         one_of("curvature", self.curvature, MEASURES)
@@ -140,6 +146,27 @@ def sector_name(ring: Ring, name: str, n_edges: int) -> str:
             f" for the sector {name!r}, got {n_edges}"
         )
     return name
+
+
+def meshes(n_edges: int, sector: str) -> tuple[int, int, int]:
+    """Edges of the full ring at the three levels.
+
+    Parameters
+    ----------
+    sector : "full", "half" or "quarter"; "auto" is resolved before (`sector_name`).
+
+    Raises
+    ------
+    ValueError
+        Where N/4 edges are too few or do not divide into the sector.
+    """
+    divisor = 4 * (4 if sector == "quarter" else 2)
+    if n_edges % divisor or n_edges < 32:
+        raise ValueError(
+            f"n_edges must be at least 32 and divisible by {divisor} for error bars on the sector"
+            f" {sector!r} (they need N/2 and N/4 edges), got {n_edges}"
+        )
+    return n_edges, n_edges // 2, n_edges // 4
 
 
 def _whole(name: str, value: object) -> int:

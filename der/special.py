@@ -21,6 +21,7 @@ from der.sector import Sector
 from der.stability import index, raw_index
 from der.step import ROOT, Step, root
 
+EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-5  # of s, for the passage of a strand
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 
@@ -145,9 +146,8 @@ def _between_loads(wanted: Wanted, low: float, high: float) -> Iterator[float]:
     low, high = min(low, high), max(low, high)
     targets = wanted.targets
     if targets is None:
-        eighth = math.pi / 8.0
-        first, last = math.floor(low / eighth), math.ceil(high / eighth)
-        targets = tuple(k * eighth for k in range(first, last + 1))
+        first, last = math.floor(low / EIGHTH), math.ceil(high / EIGHTH)
+        targets = tuple(k * EIGHTH for k in range(first, last + 1))
     for load in (*targets, math.pi, wanted.load_max):
         if low <= load <= high:
             yield load

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from der.record import AtPi, Mode, Path, Point
 
@@ -21,12 +23,26 @@ def summary(path: Path) -> str:
         lines += [_row(point) for point in path.points]
     if path.at_pi is not None:
         lines += ["", _at_pi(path.at_pi)]
+    if path.error is not None:
+        lines.append(_errors(path))
     t = path.timing
     lines.append(
         f"{len(path)} states, {t.steps} steps, {t.newton_iterations} Newton iterations, "
         f"{1e3 * t.solve_s:.0f} ms"
     )
     return "\n".join(lines)
+
+
+def _errors(path: Path) -> str:
+    """The largest error bars, and how many states have none."""
+    error: Mapping[str, Any] = path.error or {}
+    words = []
+    for name in ("gamma", "moment", "energy"):
+        known = [e for e in error[name] if e is not None]
+        words.append(f"{name} {max(known, default=0.0):.1e}")
+    missing = sum(e is None for e in error["moment"])
+    none = f"; none at {missing} of {len(path)} states" if missing else ""
+    return f"error bars, at most: {', '.join(words)}{none}"
 
 
 def headline(path: Path) -> str:

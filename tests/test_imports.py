@@ -30,6 +30,7 @@ ROOMS = {
         "step",
         "special",
         "path",
+        "error_bars",
         "folding",
     ),
     "views": ("summary", "view_plots"),
