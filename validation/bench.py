@@ -28,7 +28,7 @@ from der.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
 from der.rod import State
 from der.scene import MEASURES
 from der.sector import Sector, sector
-from validation.curves import curve_error, fold_error, read_reference
+from validation.curves import ReferenceCurve, curve_error, fold_error, read_reference
 
 REFERENCE = Path(__file__).parent / "reference"
 CASES = {4.0: "circ_ht4", 1.6: "circ_ht1.6", 1.0: "circ_ht1_beyond_pi"}
@@ -116,6 +116,11 @@ def _paths(repeats: int) -> Iterator[Row]:
         ("h/t 4, N 64, quarter, index at every state", _circle(4.0), None),
         ("h/t 1.6, N 64, quarter, index, two folds", _circle(1.6), None),
         ("h/t 1, N 64, until folded, index", _circle(1.0, until="folded"), None),
+        (
+            "h/t 4, N 128, quarter, error bars",
+            _circle(4.0, n_edges=128, stability=False, error_bars=True),
+            60.0,
+        ),
     ]
     for case, scene, goal in cases:
         path = der.fold(scene)
@@ -172,9 +177,26 @@ def _errors(sizes: tuple[int, ...]) -> Iterator[Row]:
                 goal = {4.0: 1e-2, 1.6: 2.5e-2}.get(h_over_t) if n == 64 else None
                 goal = goal if measure_name == MEASURES[0] else None
                 yield Row("curve error", case, errors[-1], "", goal, note)
+            if measure_name == MEASURES[0]:
+                yield from _extrapolated(h_over_t, until, reference)
             order = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
             case = f"h/t {h_over_t:g}, {measure_name}, N {sizes[0]} ... {sizes[-1]}"
             yield Row("order", case, float(order), "", 2.0)
+
+
+def _extrapolated(h_over_t: float, until: str | None, reference: ReferenceCurve) -> Iterator[Row]:
+    """Curve error of the extrapolated path."""
+    scene = _circle(
+        h_over_t, n_edges=128, stability=False, contacts=False, until=until, error_bars=True
+    )
+    path = der.fold(scene)
+    error = max(curve_error(path.gamma, path.moment, path.energy, reference))
+    note = f"in {1e3 * path.timing.solve_s:.1f} ms"
+    if reference.folds:
+        gammas = [point.gamma for point in path.folds]
+        note += f", folds off by {fold_error(gammas, reference):.2g} rad"
+    goal = 2e-5 if h_over_t == 4.0 else 3e-4
+    yield Row("curve error", f"h/t {h_over_t:g}, error bars, N 128", error, "", goal, note)
 
 
 def _newton(sizes: tuple[int, ...]) -> Iterator[Row]:
