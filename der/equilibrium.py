@@ -272,7 +272,7 @@ def dot(body: Rod, a: Direction, b: Direction) -> float:
 
     Forces do not enter.
     """
-    return float(np.sum(body.mass * a.q * b.q) + a.load * b.load)
+    return float(np.vdot(body.mass * a.q, b.q)) + a.load * b.load
 
 
 def moved(held: Supports, state: State, step: Direction) -> State:

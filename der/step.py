@@ -21,7 +21,7 @@ from der.equilibrium import (
     equilibrium,
     moved,
 )
-from der.frames import rotation_vector
+from der.frames import Array, rotation_vector
 from der.rod import State
 from der.sector import Sector
 
@@ -52,6 +52,7 @@ class Step:
     tally: Tally
     jump: Direction = field(init=False)
     end_rate: Direction = field(init=False)
+    basis: Array = field(init=False)  # (3, n b + n_c + 1) rate, jump and end rate, flat
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
@@ -64,8 +65,13 @@ class Step:
         # d/ds at the end, where s is measured along the tangent at the start
         rate = 1.0 / dot(self.piece.body, a.tangent, b.tangent)
         t = b.tangent
+        end_rate = Direction(t.q * rate, t.force * rate, t.load * rate)
+        flat = [
+            np.concatenate([d.q.ravel(), d.force, [d.load]]) for d in (a.tangent, jump, end_rate)
+        ]
         object.__setattr__(self, "jump", jump)
-        object.__setattr__(self, "end_rate", Direction(t.q * rate, t.force * rate, t.load * rate))
+        object.__setattr__(self, "end_rate", end_rate)
+        object.__setattr__(self, "basis", np.array(flat))
 
     def offset(self, s: float) -> Direction:
         """Cubic increment from the start to ``s``."""
@@ -73,12 +79,9 @@ class Step:
         h10 = self.length * u * (1.0 - u) ** 2
         h01 = u * u * (3.0 - 2.0 * u)
         h11 = self.length * u * u * (u - 1.0)
-        a, d, b = self.start.tangent, self.jump, self.end_rate
-        return Direction(
-            h10 * a.q + h01 * d.q + h11 * b.q,
-            h10 * a.force + h01 * d.force + h11 * b.force,
-            h10 * a.load + h01 * d.load + h11 * b.load,
-        )
+        cubic = np.array([h10, h01, h11]) @ self.basis
+        q = self.jump.q
+        return Direction(cubic[: q.size].reshape(q.shape), cubic[q.size : -1], float(cubic[-1]))
 
     @property
     def bulge(self) -> float:
