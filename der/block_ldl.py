@@ -29,11 +29,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from der.dense import invert, solve_dense
+
 MAX_DELAYED = 8
 
 _DELAY_BELOW = 1e-4  # relative size below which a pivot is delayed: growth stays under its inverse
 _NO_STIFFNESS = 1e-10  # of the largest entry: an unknown without stiffness of its own
-_BUNCH_PARLETT = 0.6403882032022076  # (1 + sqrt 17)/8, Bunch & Parlett 1971
 
 
 class Factors(NamedTuple):
@@ -46,85 +47,6 @@ class Factors(NamedTuple):
     schur: NDArray[np.float64]  # (M, M) C - border' lifted
     magnitude: NDArray[np.float64]  # (M,) size of the terms that make the diagonal of schur
     negative: int  # negative pivots of T
-
-
-@njit(cache=True)
-def invert(A, delay_below, out_delayed):
-    """Replace the symmetric ``A`` (m, m) by -A^-1, by sweeps with complete pivoting.
-
-    Pivots are single entries or pairs (Bunch & Parlett), so an indefinite ``A`` is safe. When all
-    that is left is below ``delay_below``, 1 is added to the largest diagonal entry k left, and
-    ``out_delayed[k]`` says so; with ``delay_below`` = 0 nothing is added.
-
-    Returns (number of negative pivots, smallest |pivot|); a zero pivot ends with (count, 0).
-    """
-    m = A.shape[0]
-    swept = np.zeros(m, dtype=np.bool_)
-    left = m
-    negative = 0
-    smallest = np.inf
-    while left > 0:
-        on, off, k, i2, j2 = -1.0, -1.0, 0, 0, 0
-        for i in range(m):
-            if swept[i]:
-                continue
-            if abs(A[i, i]) > on:
-                on, k = abs(A[i, i]), i
-            for j in range(i):
-                if not swept[j] and abs(A[i, j]) > off:
-                    off, i2, j2 = abs(A[i, j]), i, j
-        if max(on, off) <= delay_below:
-            if delay_below == 0.0:
-                return negative, 0.0
-            out_delayed[k] = 1.0
-            A[k, k] += 1.0
-            on, off = abs(A[k, k]), 0.0
-        if on >= _BUNCH_PARLETT * off:
-            d = A[k, k]
-            negative += d < 0.0
-            smallest = min(smallest, abs(d))
-            for i in range(m):
-                if i != k:
-                    ratio = A[i, k] / d
-                    for j in range(i + 1):
-                        if j != k:
-                            A[i, j] -= ratio * A[j, k]
-                            A[j, i] = A[i, j]
-            for i in range(m):
-                if i != k:
-                    A[i, k] /= d
-                    A[k, i] = A[i, k]
-            A[k, k] = -1.0 / d
-            swept[k] = True
-            left -= 1
-        else:
-            a, c, d = A[i2, i2], A[i2, j2], A[j2, j2]
-            det = a * d - c * c  # negative, by the choice of the pair
-            negative += 1
-            smallest = min(smallest, np.sqrt(-det))
-            for i in range(m):
-                if i != i2 and i != j2:
-                    x = (d * A[i, i2] - c * A[i, j2]) / det
-                    y = (a * A[i, j2] - c * A[i, i2]) / det
-                    for j in range(i + 1):
-                        if j != i2 and j != j2:
-                            A[i, j] -= x * A[j, i2] + y * A[j, j2]
-                            A[j, i] = A[i, j]
-            for i in range(m):
-                if i != i2 and i != j2:
-                    x = (d * A[i, i2] - c * A[i, j2]) / det
-                    y = (a * A[i, j2] - c * A[i, i2]) / det
-                    A[i, i2] = x
-                    A[i2, i] = x
-                    A[i, j2] = y
-                    A[j2, i] = y
-            A[i2, i2], A[j2, j2] = -d / det, -a / det
-            A[i2, j2] = c / det
-            A[j2, i2] = A[i2, j2]
-            swept[i2] = True
-            swept[j2] = True
-            left -= 2
-    return negative, smallest
 
 
 @njit(cache=True)
@@ -263,39 +185,6 @@ def inertia(factors):
             scaled[p, q] = factors.schur[p, q] / size if size > 0.0 else 0.0
     minus, smallest = invert(scaled, 0.0, np.zeros(M))
     return factors.negative + minus, smallest
-
-
-@njit(cache=True)
-def solve_dense(A, x):
-    """Replace ``x`` (m, r) by A^-1 x; Gaussian elimination with partial pivoting, destroys A.
-
-    Returns False, with ``x`` undefined, where a pivot is exactly zero.
-    """
-    m, r = x.shape
-    for k in range(m):
-        p = k
-        for i in range(k + 1, m):
-            if abs(A[i, k]) > abs(A[p, k]):
-                p = i
-        if A[p, k] == 0.0:
-            return False
-        if p != k:
-            for j in range(m):
-                A[k, j], A[p, j] = A[p, j], A[k, j]
-            for c in range(r):
-                x[k, c], x[p, c] = x[p, c], x[k, c]
-        for i in range(k + 1, m):
-            ratio = A[i, k] / A[k, k]
-            for j in range(k + 1, m):
-                A[i, j] -= ratio * A[k, j]
-            for c in range(r):
-                x[i, c] -= ratio * x[k, c]
-    for k in range(m - 1, -1, -1):
-        for c in range(r):
-            for j in range(k + 1, m):
-                x[k, c] -= A[k, j] * x[j, c]
-            x[k, c] /= A[k, k]
-    return True
 
 
 @njit(cache=True)

@@ -20,7 +20,7 @@ HOUSE = Path(__file__).parent.parent
 ROOMS = {
     "statement": ("checks", "outline", "profiles", "ring", "sections", "scene"),
     "answer": ("files", "record"),
-    "kernels": ("frames", "strain", "block_ldl", "linking", "assembly"),
+    "kernels": ("frames", "strain", "dense", "block_ldl", "linking", "assembly"),
     "engine": (
         "rod",
         "supports",
