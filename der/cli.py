@@ -164,6 +164,15 @@ def fold(
     stability: Annotated[
         bool, typer.Option("--stability/--no-stability", help="Index of the full ring.")
     ] = True,
+    control: Annotated[
+        str, typer.Option(help="arclength (through folds), angle or moment (with snaps).")
+    ] = "arclength",
+    unload: Annotated[
+        bool, typer.Option("--unload", help="Come back to 0, with --control angle.")
+    ] = False,
+    solver: Annotated[
+        str, typer.Option(help="newton, or relaxation with --control angle.")
+    ] = "newton",
     error_bars: Annotated[
         bool, typer.Option("--error-bars", help="Extrapolate from N, N/2, N/4 edges, with errors.")
     ] = False,
@@ -193,6 +202,9 @@ def fold(
             sector=sector,
             stability=stability,
             error_bars=error_bars,
+            control=control,
+            unload=unload,
+            solver=solver,
             shapes=plot is not None or out is not None,
             gamma_max=gamma_max,
             until=until,

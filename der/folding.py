@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -13,9 +13,11 @@ import numpy as np
 
 from der.assembly import assemble
 from der.checks import counts
+from der.control import follow_angle, follow_moment, follow_relaxed
 from der.error_bars import error_bars
 from der.path import follow
 from der.record import AtPi, Path, Point, Shapes, Timing, folding_mode
+from der.relaxation import relax
 from der.ring import circle
 from der.rod import State
 from der.scene import Scene, meshes
@@ -90,7 +92,7 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
         contacts=scene.looks_for_contacts,
         tolerance=scene.tolerance,
     )
-    _load_kernels(wanted.stability, wanted.contacts)
+    _load_kernels(wanted.stability, wanted.contacts, snaps=scene.control != "arclength")
     tally = Tally()
     visits: list[Visit] = []
     started = time.perf_counter()
@@ -100,7 +102,7 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
         return _record(scene, piece, visits, timing, status, message)
 
     try:
-        for visit in follow(piece, wanted, tally):
+        for visit in _march(scene, piece, wanted, tally):
             visits.append(visit)
             if progress is not None:
                 progress(visit.at.state.load)
@@ -165,10 +167,25 @@ def _with_error_bars(
     )
 
 
+def _march(scene: Scene, piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
+    """The states of the path, in the way in which the scene is controlled and solved."""
+    if scene.solver == "relaxation":
+        # no Hessian anywhere: neither index nor link is looked for between states
+        bare = replace(wanted, stability=False, contacts=False)
+        return follow_relaxed(piece, bare, tally, unload=scene.unload)
+    if scene.control == "angle":
+        return follow_angle(piece, wanted, tally, unload=scene.unload)
+    if scene.control == "moment":
+        return follow_moment(piece, wanted, tally)
+    return follow(piece, wanted, tally)
+
+
 @cache
-def _load_kernels(stability: bool, contacts: bool) -> None:
+def _load_kernels(stability: bool, contacts: bool, *, snaps: bool) -> None:
     """Load or compile the kernels that a path needs, once a process, before the clock starts."""
     piece = sector(circle(), section(1.0, 1.0), 8)
+    if snaps:
+        relax(piece.body, piece.held, piece.start)
     for _ in follow(piece, Wanted(load_max=0.1, stability=stability, contacts=contacts), Tally()):
         pass
 
@@ -189,7 +206,7 @@ def _record(
     for k, visit in enumerate(visits):
         if visit.at.state.load == math.pi:
             at_rest = abs(moments[k]) <= _NO_MOMENT * float(np.abs(moments).max())
-            free = _free_index(scene, piece, visit) if at_rest and scene.stability else None
+            free = _free_index(scene, piece, visit) if at_rest and visit.index else None
             at_pi = AtPi(
                 float(moments[k]),
                 piece.moment(visit.at.slope),
@@ -205,6 +222,8 @@ def _record(
                 gamma, moments[end], before, at_pi, three_covered=three_covered(piece, visit.at)
             )
             break
+    if scene.control == "moment":
+        mode = None  # a ring that fell through under its moment tells nothing of its folds in gamma
     return Path(
         solver="der",
         ring=scene.ring.to_json(),
@@ -299,6 +318,9 @@ def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
         "tolerance": scene.tolerance,
         "gamma_max": scene.gamma_max,
         "until": scene.until,
+        "control": scene.control,
+        "unload": scene.unload,
+        "solver": scene.solver,
         "error_bars": scene.error_bars,
         "save_at": None if scene.save_at is None else list(scene.save_at),
         "stability": scene.stability,

@@ -354,7 +354,7 @@ def folding_mode(
         raise ValueError(f"gamma never reaches pi, only {np.max(gamma, initial=0.0)!r}")
     kinds = {point.kind for point in points if point.position <= arrived[0]}
     foldable = three_covered and abs(at_pi.moment) <= NO_MOMENT * float(np.abs(moment).max())
-    if "fold" in kinds:
+    if kinds & {"fold", "snap"}:  # by dynamic relaxation alone a snap is seen, and no fold
         snapping = "snap-back"
     elif "limit" in kinds:
         snapping = "snap-through"

@@ -12,6 +12,8 @@ from der.ring import Ring
 from der.sections import Section
 
 MEASURES = ("logarithm", "angle", "tangent")  # of curvature, see strain.py
+CONTROLS = ("arclength", "angle", "moment")
+SOLVERS = ("newton", "relaxation")
 STRETCH = ("inextensible", "finite")
 COPIES = {"full": 1, "half": 2, "quarter": 4}  # how many of a sector make the ring
 
@@ -38,6 +40,11 @@ class Scene:
         the path then holds extrapolated values with their errors. From 32 edges on, divisible by
         16 on a quarter and by 8 otherwise.
     shapes : whether to keep vertices and frames of every state.
+    control : "arclength" follows the path of equilibria through its folds; "angle" turns the grips
+        and "moment" raises a dead moment: the state is then a minimum, and where it ceases to be
+        one the ring snaps.
+    unload : with angle control, come back to gamma = 0 afterwards.
+    solver : "newton", or "relaxation": the march of the angle by dynamic relaxation alone.
     gamma_max : the path ends at its first arrival there [rad].
     until : "folded": go on, beyond pi and back, until the three-covered state at pi is reached;
         ``gamma_max`` then only ends the path where it is above pi.
@@ -62,6 +69,9 @@ class Scene:
     contacts: bool | None = None
     error_bars: bool = False
     shapes: bool = False
+    control: str = "arclength"
+    unload: bool = False
+    solver: str = "newton"
     gamma_max: float = math.pi
     until: str | None = None
     save_at: Sequence[float] | None = None
@@ -80,12 +90,13 @@ class Scene:
             )
         object.__setattr__(self, "n_edges", _whole("n_edges", self.n_edges))
         sector_name(self.ring, self.sector, self.n_edges)
-        for name in ("stability", "error_bars", "shapes"):
+        for name in ("stability", "error_bars", "shapes", "unload"):
             object.__setattr__(self, name, truth(name, getattr(self, name)))
         if self.error_bars:
             meshes(self.n_edges, sector_name(self.ring, self.sector, self.n_edges))
         if self.contacts is not None:
             object.__setattr__(self, "contacts", truth("contacts", self.contacts))
+        self._check_control()
         one_of("curvature", self.curvature, MEASURES)
         one_of("stretch", self.stretch, STRETCH)
         if self.until is not None:
@@ -103,6 +114,24 @@ class Scene:
             )
         if self.save_at is not None:
             self._check_save_at(self.save_at)
+
+    def _check_control(self) -> None:
+        one_of("control", self.control, CONTROLS)
+        one_of("solver", self.solver, SOLVERS)
+        if self.control != "angle":
+            if self.unload:
+                raise ValueError(f"unload must come with control 'angle', got {self.control!r}")
+            if self.solver == "relaxation":
+                raise ValueError(
+                    f"solver 'relaxation' must come with control 'angle', got {self.control!r}"
+                )
+        if self.control != "arclength":
+            if self.until is not None:
+                raise ValueError(f"until must come with control 'arclength', got {self.control!r}")
+            if self.error_bars:
+                raise ValueError(
+                    f"error_bars must come with control 'arclength', got {self.control!r}"
+                )
 
     def _check_save_at(self, values: Sequence[float]) -> None:
         last = math.inf if self.until == "folded" else self.gamma_max

@@ -23,6 +23,7 @@ from der.step import ROOT, Step, root
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-5  # of s, for the passage of a strand
+_BRIEF = 1e-3  # of s, between a passage and its reversal
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 
 
@@ -257,7 +258,23 @@ def _passages(
         line[0] = replace(line[0], visit=replace(line[0].visit, link=piece.link(step.start.state)))
     end = replace(last, visit=replace(last.visit, link=piece.link(last.visit.at.state)))
     found = _contacts(piece, wanted, step, (line[0].s, line[0].visit.link), (end.s, end.visit.link))
-    return sorted([*line[:-1], end, *found], key=lambda m: m.s)
+    return sorted([*line[:-1], end, *_lasting(found)], key=lambda m: m.s)
+
+
+def _lasting(contacts: list[_Mark]) -> list[_Mark]:
+    """Contacts without those that undo the one before within a hair's breadth of s.
+
+    Close to the folded state the strands lie within the mesh's sagitta of each other: such pairs
+    come and go with N.
+    """
+    kept: list[_Mark] = []
+    for m in contacts:
+        back = m.visit.details["linking_after"]
+        if kept and m.s - kept[-1].s < _BRIEF and kept[-1].visit.details["linking_before"] == back:
+            kept.pop()
+        else:
+            kept.append(m)
+    return kept
 
 
 def _contacts(

@@ -14,7 +14,7 @@ def summary(path: Path) -> str:
     lines = [headline(path)]
     if path.mode is not None:
         lines.append(mode_in_words(path.mode))
-    elif path.status == "done" and len(path):
+    elif path.status == "done" and path.at_pi is None and len(path):
         lines.append(f"ends at gamma = {path.gamma[-1]:.6g}, before pi")
     if path.status != "done":
         lines.append(f"{path.status}: {path.message}")
@@ -77,6 +77,8 @@ def _row(point: Point) -> str:
     before, after = ("?" if i is None else i for i in (point.index_before, point.index_after))
     index = f"{before}" if before == after else f"{before} -> {after}"
     extra = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in point.details.items())
+    if point.kind == "snap":
+        extra = f"releases {point.details['energy_released']:.7g}"
     numbers = f"{point.gamma:12.8f}{point.gamma / math.pi:10.6f}{point.moment:12.7f}"
     return f"{point.kind:9}{numbers}{point.energy:12.7f}  {index:7} {extra}".rstrip()
 

@@ -30,18 +30,20 @@ Array: TypeAlias = NDArray[np.float64]
 FORMATS = (".png", ".pdf", ".svg")
 SIZE, DPI = (8.0, 6.0), 150  # inches; 1200 x 900 px
 INK, QUIET = "#222222", "#8a8a8a"
+SNAP = "snap"  # a stretch between two equilibria that no equilibria join
 # line style of a stretch by whether it is stable; blue and vermilion of Okabe and Ito
-STRETCHES: dict[bool | None, tuple[str, str, Any]] = {
+STRETCHES: dict[bool | str | None, tuple[str, str, Any]] = {
     True: ("stable ($\\gamma$ held)", "#0072B2", "-"),
     False: ("unstable ($\\gamma$ held)", "#D55E00", (0, (3.5, 1.6))),
     None: ("equilibria (stability not computed)", "#0072B2", "-"),
+    SNAP: ("the ring snaps", "#8a8a8a", (0, (1.2, 1.4))),
 }
 STATE: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.2, "color": INK}
 MARKS = {  # label, marker, size
     "fold": ("fold", "D", 4.6),
     "limit": ("limit of M", "^", 5.6),
     "branch": ("branch point", "s", 4.8),
-    "snap": ("snap", "*", 8.0),
+    "snap": ("landing", "*", 8.0),
     "contact": ("self-crossing", "x", 4.6),
 }
 
@@ -214,13 +216,15 @@ def _draw_curve(panel: Axes, path: Path, height: Array, label: str) -> None:
     panel.yaxis.set_label_coords(-0.062, 0.5)
 
 
-def _stability(path: Path) -> list[bool | None]:
+def _stability(path: Path) -> list[bool | str | None]:
     """Whether each interval between neighbouring states is stable; None where nothing is known.
+
+    An interval that the ring snaps over is SNAP.
 
     A state of unknown index, as special points are, leaves the intervals beside it to its
     neighbours: the style changes there.
     """
-    known = [None if i is None else i == 0 for i in path.index.tolist()]
+    known: list[bool | str | None] = [None if i is None else i == 0 for i in path.index.tolist()]
     if len(known) == 1:
         return known
     found = [a if a is not None else b for a, b in pairwise(known)]
@@ -228,10 +232,31 @@ def _stability(path: Path) -> list[bool | None]:
         for k in way:
             if found[k] is None:
                 found[k] = found[k - 1 if way.step > 0 else k + 1]
+    for k in _snaps(path):
+        found[k - 1] = SNAP
     return found
 
 
-def _stretches(path: Path, height: Array) -> Iterator[tuple[bool | None, Array]]:
+def _snaps(path: Path) -> list[int]:
+    """Positions of the states in which snaps have landed."""
+    return [point.position for point in path.points if point.kind == "snap" and point.position]
+
+
+def _pieces(path: Path) -> list[tuple[int, int]]:
+    """First and last states of the smooth pieces: cut at snaps, and where gamma is turned back."""
+    landed = _snaps(path)
+    way = np.diff(np.column_stack([path.gamma, path.moment]), axis=0)
+    turned = [
+        k
+        for k in range(1, len(path) - 1)
+        if np.dot(way[k - 1], way[k]) < -0.9 * np.linalg.norm(way[k - 1]) * np.linalg.norm(way[k])
+    ]
+    starts = sorted({0, *landed, *turned})
+    lasts = [k - 1 if k in landed else k for k in starts[1:]] + [len(path) - 1]
+    return list(zip(starts, lasts, strict=True))
+
+
+def _stretches(path: Path, height: Array) -> Iterator[tuple[bool | str | None, Array]]:
     """Yield the smooth curve (gamma/pi, height) in stretches of one stability."""
     if len(path) == 1:
         return
@@ -249,14 +274,25 @@ def _smooth(path: Path, height: Array, per: int = 16) -> Array:
     The natural cubic spline of the chord length along (gamma, M), which turns with the path through
     folds; on circles it is within 0.3% of the panel of the true path, monotone cubics within 0.4%.
     """
+    values = np.column_stack([path.gamma / math.pi, height])
+    place = np.arange(per * (len(path) - 1) + 1) / per
+    curve = np.column_stack([np.interp(place, np.arange(len(path)), v) for v in values.T])
+    chord = _chord(path)
+    for first, last in _pieces(path):
+        piece = slice(first, last + 1)
+        inside = slice(first * per, last * per + 1)
+        curve[inside] = _spline(chord[piece], values[piece], place[inside] - first)
+    return curve
+
+
+def _spline(chord: Array, values: Array, place: Array) -> Array:
+    """Natural cubic spline of one piece, at places counted in states."""
     from scipy.interpolate import CubicSpline
 
-    values = np.column_stack([path.gamma / math.pi, height])
-    chord = _chord(path)
     is_new = np.append(True, np.diff(chord) > 1e-5)  # neighbours in the same place make no slope
     if np.count_nonzero(is_new) == 1:
-        return np.repeat(values[:1], per * (len(path) - 1) + 1, axis=0)
-    at = np.interp(np.arange(per * (len(path) - 1) + 1) / per, np.arange(len(path)), chord)
+        return np.repeat(values[:1], len(place), axis=0)
+    at = np.interp(place, np.arange(len(chord)), chord)
     curve: Array = CubicSpline(chord[is_new], values[is_new], bc_type="natural")(at)
     return curve
 

@@ -402,3 +402,68 @@ def test_error_bars_need_halves_of_halves():
     """N/4 edges have to divide into the sector, too."""
     with pytest.raises(ValueError, match=r"^n_edges must be at least 32 and divisible by 16 .*40"):
         der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=40, error_bars=True)
+
+
+# --- Angle and moment control ------------------------------------------------------------------
+
+
+def test_angle_control_snaps_at_the_folds_and_back():
+    """Loading and unloading at h/t = 1.6: two snaps, at the folds that arclength finds.
+
+    What they release is 4 times the area of the loop in (gamma, M), to the 2e-4 of the trapezoidal
+    rule on steps of pi/400 (measured 5e-5).
+    """
+    there = folded(1.6, n_edges=64)
+    loads = tuple(np.linspace(0.0, math.pi, 401))
+    path = folded(1.6, n_edges=64, control="angle", unload=True, save_at=loads)
+    snaps = [point for point in path.points if point.kind == "snap"]
+    assert [snap.details["gamma_fold"] for snap in snaps] == pytest.approx(
+        [fold.gamma for fold in there.folds], abs=1e-6
+    )
+    released = [snap.details["energy_released"] for snap in snaps]
+    assert min(released) > 0.0
+    cut = path.gamma.tolist().index(math.pi)
+    assert path.gamma[-1] == 0.0
+    assert path.energy[-1] == pytest.approx(0.0, abs=1e-9)
+    work = 4 * np.trapezoid(path.moment, path.gamma)
+    assert work == pytest.approx(sum(released), abs=2e-4)
+    assert path.mode.snapping == "snap-back"
+    assert cut > snaps[0].position
+
+
+def test_moment_control_snaps_at_the_limit():
+    """A dead moment carries the ring to dM/dgamma = 0; from there it falls at that moment."""
+    path = folded(1.6, n_edges=64, control="moment")
+    snap = next(point for point in path.points if point.kind == "snap")
+    limit = next(point for point in path.points if point.kind == "limit")
+    assert snap.moment == pytest.approx(limit.moment, abs=1e-9)
+    assert snap.gamma > limit.gamma + 1.0
+    assert path.mode is None
+
+
+def test_relaxation_agrees_with_newton():
+    """The march by dynamic relaxation alone has the moments of Newton's equilibria, to 1e-6."""
+    relaxed = folded(4.0, control="angle", solver="relaxation")
+    newton = folded(4.0)
+    for k in range(1, 9):
+        there = at(newton, k * EIGHTH, "moment")
+        assert at(relaxed, k * EIGHTH, "moment") == pytest.approx(there, abs=1e-6)
+    assert relaxed.timing.newton_iterations == 0
+    assert relaxed.index.mask.all()
+
+
+@pytest.mark.parametrize(
+    ("wants", "name"),
+    [
+        ({"unload": True}, "unload"),
+        ({"solver": "relaxation"}, "solver"),
+        ({"solver": "magic"}, "solver"),
+        ({"control": "force"}, "control"),
+        ({"control": "angle", "until": "folded"}, "until"),
+        ({"control": "moment", "error_bars": True}, "error_bars"),
+    ],
+)
+def test_controls_that_do_not_go_together_are_refused(wants, name):
+    """By the name of what cannot be had."""
+    with pytest.raises(ValueError, match=f"^{name} "):
+        der.Scene(der.circle(), der.rectangular_section(4.0), **wants)

@@ -112,13 +112,25 @@ def test_legend_lists_only_what_occurs():
     [
         ("limit", "limit of M"),
         ("branch", "branch point"),
-        ("snap", "snap"),
         ("contact", "self-crossing"),
     ],
 )
 def test_every_kind_of_point_has_its_entry(kind, label):
     subject = path(points=(special(kind, 5, 1.5, 1.5),))
     assert legend(figure_of_path(subject)) == [STABLE, UNSTABLE, label, "computed state"]
+
+
+def test_snap_is_a_line_of_its_own():
+    """No equilibria join the states before and after it: a straight dotted line does."""
+    subject = path(points=(special("snap", 5, 1.5, 1.5),))
+    figure = figure_of_path(subject)
+    assert "the ring snaps" in legend(figure)
+    assert "landing" in legend(figure)
+    ends = np.column_stack([subject.gamma, subject.moment])[4:6] / (np.pi, 1.0)
+    curves = [line.get_xydata() for line in figure.axes[0].lines]
+    (jump,) = [c for c in curves if len(c) > 2 and np.allclose(c[[0, -1]], ends)]
+    along = np.linspace(0.0, 1.0, len(jump))[:, None]
+    assert_allclose(jump, ends[0] + along * (ends[1] - ends[0]), atol=1e-12)
 
 
 def test_path_without_index_says_that_stability_was_not_computed():
