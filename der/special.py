@@ -22,7 +22,7 @@ from der.stability import index, raw_index
 from der.step import ROOT, Step, root
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
-_CONTACT = 1e-5  # of s, for the passage of a strand
+_CONTACT = 1e-4  # of s, for the passage of a strand: an ideal ring asks for no more
 _BRIEF = 1e-3  # of s, between a passage and its reversal
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 
