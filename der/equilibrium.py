@@ -188,7 +188,8 @@ def _correct(
         _move(held, quat, stretch, force, x, y, z[0])
         load += z[0]
         iteration += 1
-    return Correction(
+    # a plain tuple: to make a named one runs Python, in which Ctrl-C would end the process
+    return (
         outcome,
         system.bent_too_far,
         iteration,
@@ -316,19 +317,21 @@ def equilibrium(
         row, row_load = np.zeros(held.free.shape), 1.0
     else:
         row, row_load = body.mass * along.q, along.load
-    c = _correct(
-        body,
-        held,
-        start.quat,
-        start.stretch,
-        start.force,
-        float(start.load),
-        int(control),
-        row,
-        row_load,
-        moment,
-        tolerance,
-        iterations,
+    c = Correction(
+        *_correct(
+            body,
+            held,
+            start.quat,
+            start.stretch,
+            start.force,
+            float(start.load),
+            int(control),
+            row,
+            row_load,
+            moment,
+            tolerance,
+            iterations,
+        )
     )
     return Equilibrium(
         State(c.quat, c.stretch, c.force, c.load),

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from types import FrameType
 
 import numpy as np
 
@@ -92,7 +96,6 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
         contacts=scene.looks_for_contacts,
         tolerance=scene.tolerance,
     )
-    _load_kernels(wanted.stability, wanted.contacts, snaps=scene.control != "arclength")
     tally = Tally()
     visits: list[Visit] = []
     started = time.perf_counter()
@@ -102,10 +105,15 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
         return _record(scene, piece, visits, timing, status, message)
 
     try:
-        for visit in _march(scene, piece, wanted, tally):
-            visits.append(visit)
-            if progress is not None:
-                progress(visit.at.state.load)
+        with _interrupts_between_states() as pressed:
+            _load_kernels(wanted.stability, wanted.contacts, snaps=scene.control != "arclength")
+            started = time.perf_counter()
+            for visit in _march(scene, piece, wanted, tally):
+                visits.append(visit)
+                if progress is not None:
+                    progress(visit.at.state.load)
+                if pressed:
+                    raise KeyboardInterrupt
     except Stuck as stuck:
         raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
     except KeyboardInterrupt:
@@ -113,6 +121,31 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
     if scene.error_bars:
         return _with_error_bars(scene, piece, visits, record)
     return record("done")
+
+
+@contextmanager
+def _interrupts_between_states() -> Iterator[list[int]]:
+    """Take down Ctrl-C in a list, instead of raising; a second one raises at once.
+
+    Numba's wrappers do not look for exceptions while they hand results over, so that one raised
+    there would end the process, and all that was computed with it.
+    """
+    pressed: list[int] = []
+
+    def take_down(number: int, frame: FrameType | None) -> None:
+        if pressed:
+            signal.default_int_handler(number, frame)
+        pressed.append(number)
+
+    usual = threading.current_thread() is threading.main_thread()
+    if not usual or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield pressed
+        return
+    signal.signal(signal.SIGINT, take_down)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _piece(scene: Scene, n_edges: int, name: str) -> Sector:
