@@ -565,10 +565,10 @@ def test_where_newton_fails_the_flat_state_is_saved(run, monkeypatch):
 
 @pytest.mark.usefixtures("interrupted")
 def test_ctrl_c_saves_what_there_is(run):
-    """Code 130; status interrupted; the states so far in the named file."""
+    """Code 130; status interrupted; the states so far, the one in work included, in the file."""
     code, out, err = run(*SMALL, "--quiet", "--json", "f.json")
     path = saved("f.json")
-    assert (code, out, path.status, len(path)) == (130, "", "interrupted", 5)
+    assert (code, out, path.status, len(path)) == (130, "", "interrupted", 6)
     assert err == [
         "der: stopped by the user; the path up to its last good state, "
         f"at gamma = {path.gamma[-1]:.8g}, is in f.json, its shapes in f.npz"
