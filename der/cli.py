@@ -183,6 +183,9 @@ def fold(
     plot: Annotated[
         str | None, typer.Option(metavar="F", help="Draw the path: .png, .pdf or .svg.")
     ] = None,
+    rrd: Annotated[
+        str | None, typer.Option(metavar="F", help="Record for playback with rerun: .rrd.")
+    ] = None,
     out: Annotated[
         str | None,
         typer.Option(metavar="DIR", help="Write path.json, path.png and shapes.npz here."),
@@ -205,7 +208,7 @@ def fold(
             control=control,
             unload=unload,
             solver=solver,
-            shapes=plot is not None or out is not None,
+            shapes=any(file is not None for file in (plot, rrd, out)),
             gamma_max=gamma_max,
             until=until,
             save_at=_numbers("save_at", save_at),
@@ -214,7 +217,7 @@ def fold(
             a_over_t=a_over_t,
             tolerance=tolerance,
         )
-        targets = _targets(json, plot, out)
+        targets = _targets(json, plot, rrd, out)
     raise typer.Exit(_fold(scene, targets, quiet=quiet))
 
 
@@ -265,7 +268,9 @@ def _numbers(name: str, text: str | None) -> tuple[float, ...] | None:
         raise ValueError(f"{name} must be numbers separated by commas, got {text!r}") from None
 
 
-def _targets(json: str | None, plot: str | None, out: str | None) -> dict[str, File]:
+def _targets(
+    json: str | None, plot: str | None, rrd: str | None, out: str | None
+) -> dict[str, File]:
     """The files to write, after making sure that they can be written."""
     targets: dict[str, File] = {}
     if out is not None:
@@ -287,6 +292,10 @@ def _targets(json: str | None, plot: str | None, out: str | None) -> dict[str, F
         if File(plot).suffix not in FORMATS:
             raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
         targets["plot"] = File(plot)
+    if rrd is not None:
+        if File(rrd).suffix != ".rrd":
+            raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
+        targets["rrd"] = File(rrd)
     if targets.get("json") in [targets[name] for name in ("plot", "shapes") if name in targets]:
         raise ValueError(f"json must be a file of its own, got {json!r} twice")
     for name, file in targets.items():
@@ -377,13 +386,13 @@ def _progress(scene: Scene, *, quiet: bool) -> Iterator[Callable[[float], object
 
 
 def _write(path: Path, targets: dict[str, File]) -> bool:
-    """Write the record first, then its shapes and picture; say what could not be written.
+    """Write the record first, then what goes with it; say what could not be written.
 
     A record that cannot be written where it should goes to standard output, also in ``targets``:
     nothing already computed is lost.
     """
     done = True
-    for name in ("json", "shapes", "plot"):
+    for name in ("json", "shapes", "plot", "rrd"):
         file = targets.get(name)
         if file is None:
             continue
@@ -396,6 +405,10 @@ def _write(path: Path, targets: dict[str, File]) -> bool:
                 from der.view_plots import save_plot
 
                 save_plot(path, file)
+            elif name == "rrd" and len(path) > 1:
+                from der.view_rerun import save_recording
+
+                save_recording(path, file)
         except (OSError, ValueError) as wrong:
             done = False
             _say(f"der: could not write {file}: {wrong}")

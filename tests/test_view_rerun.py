@@ -1,0 +1,458 @@
+"""A recording shows what the record says, is read back here, and is written whole or not at all."""
+
+import errno
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rerun as rr
+from numpy.testing import assert_allclose, assert_array_equal
+from rerun.chunk import RrdReader
+
+import der
+from der import files, view_rerun
+from der.record import Shapes, Timing, counts
+from der.view_rerun import Motion, playback, recording_bytes, save_recording
+
+EDGES = 32
+
+
+@pytest.fixture(scope="module", autouse=True)
+def strict():
+    """Wrong shapes raise: by default rerun only warns."""
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture(scope="module")
+def path():
+    """A circle of h/t = 1.6, which snaps back: two folds with an unstable branch in between."""
+    scene = der.Scene(
+        der.circle(), der.rectangular_section(h_over_t=1.6), n_edges=EDGES, shapes=True
+    )
+    return der.fold(scene)
+
+
+@pytest.fixture(scope="module")
+def read(path, tmp_path_factory):
+    """The recording of that path, read back."""
+    file = tmp_path_factory.mktemp("rrd") / "path.rrd"
+    save_recording(path, file)
+    return Recording(file)
+
+
+class Recording:
+    """Columns of a file, by entity and component; None for the step of what is static."""
+
+    def __init__(self, file):
+        self.columns = {}
+        for chunk in RrdReader(file).stream():
+            batch = chunk.to_record_batch()
+            steps = None if chunk.is_static else batch.column("step").to_pylist()
+            for name in batch.schema.names:
+                if ":" in name:
+                    rows = batch.column(name).to_pylist()
+                    key = (chunk.entity_path, name)
+                    known = self.columns.setdefault(key, ([], []))
+                    known[0].extend(steps or [None] * len(rows))
+                    known[1].extend(rows)
+
+    def rows(self, entity, name):
+        """Values by step, in their order: a chunk may be sorted by the other timeline."""
+        steps, values = self.columns[entity, name]
+        order = sorted(range(len(steps)), key=lambda k: steps[k] or 0)
+        return {steps[k]: values[k] for k in order}
+
+    def series(self, name):
+        """Steps and values of a scalar."""
+        rows = self.rows(f"/series/{name}", "Scalars:scalars")
+        return list(rows), np.array([value for (value,) in rows.values()])
+
+    @property
+    def entities(self):
+        """Paths of all that was logged."""
+        return {entity for entity, _ in self.columns}
+
+
+def written(tmp_path, path, **more):
+    save_recording(path, tmp_path / "some.rrd", **more)
+    return Recording(tmp_path / "some.rrd")
+
+
+def a_motion(path, steps=5):
+    """The ring moves from the first fold to where gamma is the same on the last branch."""
+    after = path.folds[0].position
+    chosen = np.linspace(after, len(path) - 1, steps).astype(int)
+    return Motion(after, path.shapes.x[chosen], path.shapes.frames[chosen])
+
+
+def same(one, other):
+    command = [sys.executable, "-m", "rerun", "rrd", "compare", "--unordered", one, other]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+# --- What is in it ---------------------------------------------------------------------------
+
+
+def test_everything_asked_for_has_its_place(read):
+    for entity in (
+        *("ring/ribbon", "ring/centreline", "ring/axis", "ring/trace/0", "ring/trace/1"),
+        *(f"ring/grips/{g}/{k}" for g in ("first", "second") for k in ("rotation", "moment")),
+        *(f"curves/{c}/{k}" for c in ("moment", "energy") for k in ("stable", "unstable", "now")),
+        *("series/moment", "series/energy", "series/gamma", "series/index"),
+        *("events", "states/stability", "states/event", "about", "key/bar"),
+    ):
+        assert f"/{entity}" in read.entities
+    assert "/ring/softest_mode" not in read.entities
+
+
+def test_every_state_is_a_step_and_nothing_else_is(path, read):
+    for entity, name in (
+        ("/ring/ribbon", "Mesh3D:vertex_positions"),
+        ("/ring/ribbon", "bending:colors"),
+        ("/ring/centreline", "LineStrips3D:strips"),
+        ("/curves/energy/now", "Points2D:positions"),
+    ):
+        assert list(read.rows(entity, name)) == list(range(len(path)))
+
+
+@pytest.mark.parametrize("name", ["moment", "energy", "gamma"])
+def test_series_are_those_of_the_record(path, read, name):
+    """Bit for bit: scalars are float64."""
+    steps, values = read.series(name)
+    assert steps == list(range(len(path)))
+    assert_array_equal(values, getattr(path, name))
+
+
+def test_index_is_there_where_it_is_known(path, read):
+    steps, values = read.series("index")
+    known = [k for k, index in enumerate(path.index.tolist()) if index is not None]
+    assert steps == known
+    assert_array_equal(values, path.index[known])
+
+
+def test_second_timeline_is_gamma_in_millidegrees(path, tmp_path):
+    file = tmp_path / "some.rrd"
+    save_recording(path, file)
+    chunks = [c for c in RrdReader(file).stream() if c.entity_path == "/series/gamma"]
+    (batch,) = [c.to_record_batch() for c in chunks if not c.is_static]
+    steps, mdeg = (batch.column(name).to_numpy() for name in ("step", "gamma_mdeg"))
+    assert_allclose(mdeg, 1e3 * np.degrees(path.gamma[steps]), atol=0.5)
+
+
+def test_centreline_is_closed_and_goes_through_the_vertices(path, read):
+    """To float32, of numbers below 2."""
+    rows = read.rows("/ring/centreline", "LineStrips3D:strips")
+    for k in (0, len(path) // 2, len(path) - 1):
+        line = np.array(rows[k][0])
+        assert_array_equal(line[0], line[-1])
+        assert_allclose(line[:-1], path.shapes.x[k], atol=2e-7)
+
+
+def test_section_is_a_rectangle_to_scale_about_its_vertex(path, read):
+    """Eight corners, in pairs, of a rectangle h by t along d1 and d2 of the flat ring."""
+    t, h = 1 / 200, 1.6 / 200
+    corners = np.array(read.rows("/ring/ribbon", "Mesh3D:vertex_positions")[0])[:8]
+    assert_allclose(corners.mean(axis=0), path.shapes.x[0, 0], atol=1e-6)
+    assert_array_equal(corners[::2], corners[1::2])
+    sides = np.linalg.norm(np.diff(corners[::2], axis=0), axis=1)
+    factor = playback(path).section.factor
+    assert_allclose(sides, factor * np.array([h, t, h]), rtol=1e-4)
+    assert corners[0, 0] - corners[2, 0] == pytest.approx(factor * h, rel=1e-4)  # d1 = E1
+    assert f"{factor:g} times as large" in read.rows("/about", "TextDocument:text")[None][0]
+
+
+def test_section_that_can_be_seen_is_drawn_as_it_is(path):
+    thick = replace(path, numerics={**path.numerics, "a_over_t": 5.0})
+    assert playback(thick).section.factor == 1.0
+    assert playback(thick).section.t == pytest.approx(0.2)
+
+
+def test_section_without_shape_has_that_of_its_stiffnesses(path):
+    """beta/alpha = (h/t)^2 (paper, Eq. A.16)."""
+    bare = replace(path, section={**path.section, "h_over_t": None, "nu": None})
+    drawn = playback(bare).section
+    assert drawn.h / drawn.t == pytest.approx(1.6)
+
+
+def test_normals_are_unit_and_point_out_of_the_faces(path, read):
+    """Along every normal, the vertex lies farther out than the middle of its section."""
+    k = len(path) // 2
+    positions = np.array(read.rows("/ring/ribbon", "Mesh3D:vertex_positions")[k])
+    normals = np.array(read.rows("/ring/ribbon", "Mesh3D:vertex_normals")[k])
+    assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
+    from_middle = positions - np.repeat(path.shapes.x[k], 8, axis=0)
+    assert np.all(np.sum(from_middle * normals, axis=1) > 0.01)
+
+
+def test_triangles_turn_outwards_and_close_the_surface(path, read):
+    """Volume enclosed, by the divergence theorem: h t 2 pi (Pappus), to 1% at N = 32."""
+    positions = np.array(read.rows("/ring/ribbon", "Mesh3D:vertex_positions")[0])
+    triangles = np.array(read.rows("/ring/ribbon", "Mesh3D:triangle_indices")[None])
+    assert triangles.shape == (8 * EDGES, 3)
+    a, b, c = positions[triangles].swapaxes(0, 1)
+    volume = np.sum(a * np.cross(b, c)) / 6
+    drawn = playback(path).section
+    assert volume == pytest.approx(drawn.h * drawn.t * 2 * np.pi, rel=0.01)
+
+
+def test_energy_densities_add_up_to_the_energy(path):
+    """Sum over the cells of both = U of the record, to rounding (logarithmic curvature)."""
+    film = playback(path)
+    cell = 2 * np.pi / EDGES
+    assert_allclose(cell * film.density.sum(axis=(0, 2)), path.energy, atol=1e-10)
+
+
+def test_folded_ring_is_bent_and_not_twisted(path):
+    """At pi, curvature 3 against natural 1: density alpha (3 - 1)^2 / 2 all round."""
+    bending, twisting = playback(path).density[:, -1]
+    assert_allclose(bending, 2 * path.section["alpha"], rtol=1e-6)
+    assert_allclose(twisting, 0, atol=1e-8)
+
+
+def test_colours_rise_with_the_density(path, read):
+    """Darkest where there is none, brightest at the largest, eight alike in each section."""
+    film = playback(path)
+    for name, density in zip(("bending", "twisting"), film.density, strict=True):
+        rows = read.rows("/ring/ribbon", f"{name}:colors")
+        assert set(rows[0]) == {0x440154FF}  # the flat ring is free of stress
+        at = int(np.argmax(density.max(axis=1)))
+        colours = np.array(rows[at]).reshape(EDGES, 8)
+        assert np.all(colours == colours[:, :1])
+        red, green, blue = ((colours[:, 0] >> shift) & 255 for shift in (24, 16, 8))
+        light = (0.2126 * red + 0.7152 * green + 0.0722 * blue)[np.argsort(density[at])]
+        assert np.all(np.diff(light) >= -1.0)
+
+
+@pytest.mark.parametrize(("grip", "edge", "sign"), [("first", 0, 1), ("second", EDGES // 2, -1)])
+def test_grip_arrows_show_its_turn_and_its_moment(path, read, grip, edge, sign):
+    """One grip turns +gamma about the axis, the other -gamma; moments likewise along it."""
+    turned = read.rows(f"/ring/grips/{grip}/rotation", "Arrows3D:vectors")
+    moments = read.rows(f"/ring/grips/{grip}/moment", "Arrows3D:vectors")
+    arcs = read.rows(f"/ring/grips/{grip}/angle", "LineStrips3D:strips")
+    centres = read.rows(f"/ring/grips/{grip}/rotation", "Arrows3D:origins")
+    for k in range(len(path)):
+        x, y, z = turned[k][0]
+        gamma = sign * path.gamma[k]
+        size = np.hypot(x, y)
+        assert_allclose([x / size, y / size, z], [np.cos(gamma), np.sin(gamma), 0], atol=1e-6)
+        end = np.array(arcs[k][0][-1]) - centres[k][0]  # the arc ends on the arrow
+        assert_allclose(np.cross(end, turned[k][0]), 0, atol=1e-6)
+        share = moments[k][0][2] / np.abs(path.moment).max()
+        assert sign * path.moment[k] * share >= 0
+    largest = int(np.argmax(path.moment))
+    assert sign * moments[largest][0][2] == pytest.approx(0.4, rel=0.01)
+
+
+def test_trace_leads_to_where_the_free_point_is(path, read):
+    rows = read.rows("/ring/trace/0", "LineStrips3D:strips")
+    x, j = path.shapes.x, EDGES // 4
+    for k in range(1, len(path)):
+        before, now = np.array(rows[k][0])
+        assert_allclose(now, 0.5 * (x[k, j - 1] + x[k, j]), atol=1e-6)
+        assert_array_equal(before, rows[k - 1][0][1])
+
+
+def test_dot_is_on_the_curve_and_the_curve_has_its_two_kinds(path, read):
+    dots = read.rows("/curves/moment/now", "Points2D:positions")
+    stable, unstable = (
+        [np.array(s) for s in read.rows(f"/curves/moment/{k}", "LineStrips2D:strips")[None]]
+        for k in ("stable", "unstable")
+    )
+    assert (len(stable), len(unstable)) == (2, 1)
+    first, second = (fold.position for fold in path.folds)
+    assert_allclose(unstable[0][[0, -1]], [dots[first][0], dots[second][0]], atol=1e-4)
+    curve = np.concatenate([*stable, *unstable])
+    for ((x, y),) in dots.values():
+        assert np.hypot(*(curve - [x, y]).T).min() < 1e-4
+
+
+def test_events_are_in_the_log_at_their_steps(path, read):
+    rows = read.rows("/events", "TextLog:text")
+    assert list(rows) == [point.position for point in path.points]
+    fold = rows[path.folds[0].position][0]
+    assert fold.startswith(f"fold, gamma {path.folds[0].gamma:.8g}")
+    assert "index 0 -> 1" in fold
+
+
+def test_state_lines_change_where_the_ring_does(path, read):
+    said = [state for (state,) in read.rows("/states/stability", "StateChange:state").values()]
+    assert said == ["stable", "index 1", "stable"]
+    events = read.rows("/states/event", "StateChange:state")
+    assert events[0] == ["start"]
+    assert events[path.folds[0].position] == ["fold"]
+
+
+def test_parameters_are_in_the_text(read):
+    text = read.rows("/about", "TextDocument:text")[None][0]
+    assert text.startswith("# circle, h/t = 1.6\n")
+    assert f"| n edges | {EDGES} |" in text
+
+
+# --- What may be given besides ---------------------------------------------------------------
+
+
+def test_motion_is_put_in_after_its_state(path, tmp_path):
+    """gamma rests, M is not known, U is that of the shapes; all states keep their order."""
+    motion = a_motion(path)
+    film = playback(path, motions=[motion])
+    new = slice(motion.after + 1, motion.after + 6)
+    assert len(film.x) == len(path) + 5
+    assert_array_equal(film.x[new], motion.x)
+    assert_array_equal(film.gamma[new], path.gamma[motion.after])
+    assert_array_equal(film.position[film.position >= 0], np.arange(len(path)))
+    assert film.energy[new][-1] == pytest.approx(path.energy[-1], abs=1e-10)
+
+    read = written(tmp_path, path, motions=[motion])
+    steps, moments = read.series("moment")
+    assert not set(steps) & set(range(new.start, new.stop))
+    assert_array_equal(moments, path.moment)
+    assert read.rows("/curves/moment/now", "Points2D:positions")[new.start] == []
+    assert len(read.rows("/curves/energy/now", "Points2D:positions")[new.start]) == 1
+    assert read.rows("/states/stability", "StateChange:state")[new.start] == ["in motion"]
+    *_, last = read.rows("/events", "TextLog:text")
+    assert last == path.points[-1].position + 5
+
+
+def test_energy_of_a_motion_can_be_given(path):
+    motion = replace(a_motion(path), energy=np.arange(5.0))
+    film = playback(path, motions=[motion])
+    assert_array_equal(film.energy[motion.after + 1 : motion.after + 6], np.arange(5.0))
+
+
+def test_eigenvalues_are_series_where_they_are_known(path, tmp_path):
+    values = np.linspace(1, -1, 2 * len(path)).reshape(-1, 2)
+    values[3] = np.nan
+    steps, first = written(tmp_path, path, eigenvalues=values).series("eigenvalues/0")
+    assert 3 not in steps
+    assert_array_equal(first, np.delete(values[:, 0], 3))
+
+
+def test_softest_mode_is_a_ghost_where_it_is_known(path, tmp_path):
+    """Displaced by the mode, at most by a fifth of the ring's radius, at states that have one."""
+    modes = np.full_like(path.shapes.x, np.nan)
+    modes[4] = 0.0
+    modes[4, :, 1] = np.cos(np.arange(EDGES))
+    rows = written(tmp_path, path, modes=modes).rows("/ring/softest_mode", "LineStrips3D:strips")
+    assert rows[3] == []
+    moved = np.array(rows[4][0])[:-1] - path.shapes.x[4]
+    assert_allclose(moved[:, [0, 2]], 0, atol=1e-6)
+    assert np.abs(moved).max() == pytest.approx(0.2, rel=0.01)
+
+
+def test_rest_takes_the_place_of_the_flat_ring(path):
+    """Natural strains of no bar: the flat circle then bears alpha/2 all round."""
+    bending, _ = playback(path, rest=np.zeros((EDGES, 3))).density[:, 0]
+    assert_allclose(bending, 0.5 * path.section["alpha"], rtol=1e-9)
+
+
+def cut(path, states, **changes):
+    """Some states of a path."""
+    arrays = {name: getattr(path, name)[states] for name in ("gamma", "moment", "energy")}
+    entries = {name: getattr(path, name)[states] for name in ("index", "index_moment")}
+    shapes = Shapes(path.shapes.x[states], path.shapes.frames[states])
+    return replace(path, **arrays, **entries, points=(), shapes=shapes, **changes)
+
+
+def test_one_state_is_a_recording(path, tmp_path):
+    assert written(tmp_path, cut(path, slice(0, 1))).series("moment")[0] == [0]
+
+
+def test_path_without_stability_has_neither_index_nor_its_line(path, tmp_path):
+    unknown = replace(path, index=counts([None] * len(path)))
+    entities = written(tmp_path, unknown).entities
+    assert not entities & {"/series/index", "/states/stability", "/curves/moment/stable"}
+
+
+# --- What is refused -------------------------------------------------------------------------
+
+
+def test_path_without_shapes_is_refused(path):
+    with pytest.raises(ValueError, match="path must have shapes"):
+        recording_bytes(replace(path, shapes=None))
+
+
+def test_path_that_does_not_begin_flat_needs_its_natural_strains(path):
+    with pytest.raises(ValueError, match="rest must be given where gamma begins at"):
+        playback(cut(path, slice(3, None)))
+
+
+@pytest.mark.parametrize("name", ["eigenvalues", "modes", "rest"])
+def test_wrong_shape_is_named(path, name):
+    with pytest.raises(ValueError, match=rf"{name} must have shape \(.*, got \(2,\)"):
+        playback(path, **{name: np.zeros(2)})
+
+
+def test_motion_of_another_ring_is_refused(path):
+    motion = replace(a_motion(path), x=np.zeros((5, 3, 3)))
+    with pytest.raises(ValueError, match="x of a motion must have shape"):
+        playback(path, motions=[motion])
+
+
+def test_motion_from_nowhere_is_refused(path):
+    with pytest.raises(ValueError, match="after of a motion must be a state, 0 to"):
+        playback(path, motions=[replace(a_motion(path), after=len(path))])
+
+
+@pytest.mark.parametrize("name", ["film.mp4", "film", "rrd"])
+def test_other_suffix_is_refused_before_any_work(path, tmp_path, name):
+    with pytest.raises(ValueError, match=rf"rrd must end in .rrd, got '.*{name}'"):
+        save_recording(path, tmp_path / name)
+
+
+def test_absent_folder_is_named(path, tmp_path):
+    with pytest.raises(ValueError, match=r"rrd '.*nowhere/some\.rrd' cannot be written"):
+        save_recording(path, tmp_path / "nowhere" / "some.rrd")
+
+
+def test_full_disk_leaves_the_old_file_and_nothing_else(path, tmp_path, monkeypatch):
+    """Half of the bytes go to the disk before it is full."""
+    file = tmp_path / "some.rrd"
+    file.write_bytes(b"before")
+
+    def fill(place, write):
+        def full(opened):
+            opened.write(b"RRF2")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        files.write_whole(place, full)
+
+    monkeypatch.setattr(view_rerun, "write_whole", fill)
+    with pytest.raises(ValueError, match=r"some\.rrd' cannot be written: No space left on device"):
+        save_recording(path, file)
+    assert file.read_bytes() == b"before"
+    assert [found.name for found in tmp_path.iterdir()] == ["some.rrd"]
+
+
+# --- Always the same, small, and fast --------------------------------------------------------
+
+
+def test_equal_paths_have_equal_recordings_and_others_have_not(path, tmp_path):
+    """By `rerun rrd compare`: row ids are random, all else is the same."""
+    one, two, three = (tmp_path / f"{k}.rrd" for k in (1, 2, 3))
+    save_recording(path, one)
+    again = replace(path, timing=Timing(9.0, 9, 9), shapes=Shapes(**vars(path.shapes)))
+    save_recording(again, two)
+    save_recording(replace(path, moment=path.moment + 1e-9), three)
+    names = [RrdReader(file).recordings()[0].recording_id for file in (one, two, three)]
+    assert names[0] == names[1] != names[2]
+    assert same(one, two)
+    assert not same(one, three)
+
+
+def test_400_steps_of_128_edges_stay_below_10_megabytes():
+    """The bound that was set; neighbouring states repeated would be no easier to compress."""
+    scene = der.Scene(
+        der.circle(),
+        der.rectangular_section(h_over_t=1.6),
+        n_edges=128,
+        shapes=True,
+        stability=False,
+        save_at=tuple(np.linspace(0, np.pi, 341)[1:]),
+    )
+    long = der.fold(scene)
+    assert len(long) >= 400
+    assert len(recording_bytes(long)) / len(long) * 400 < 10e6
