@@ -62,7 +62,7 @@ SKY, VERMILION, GREEN, ORANGE = (86, 180, 233), (213, 94, 0), (0, 158, 115), (23
 STRETCHES: dict[bool | None, tuple[str, Colour, float]] = {
     True: ("stable", SKY, 0.9),
     False: ("unstable", VERMILION, 0.5),
-    None: ("stability not computed", QUIET, 0.8),
+    None: ("unknown", QUIET, 0.8),
 }
 WORDS = {
     "fold": "fold",

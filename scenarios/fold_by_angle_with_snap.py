@@ -6,17 +6,13 @@ Loading and unloading snap at different folds: the loop between them is what the
 
     python -m scenarios.fold_by_angle_with_snap [DIR]
 
-writes path.json, path.png and shapes.npz to DIR (default: out/fold_by_angle_with_snap).
+writes path.json, shapes.npz, path.png and path.rrd to DIR (default: out/fold_by_angle_with_snap).
 """
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import der
-from der.summary import summary
-from der.view_plots import save_plot
+from scenarios.output import write
 
 scene = der.Scene(
     der.circle(),
@@ -31,11 +27,4 @@ snaps = [point for point in path.points if point.kind == "snap"]
 released = [snap.details["energy_released"] for snap in snaps]
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/fold_by_angle_with_snap")
-    folder.mkdir(parents=True, exist_ok=True)
-    path.save(folder / "path.json")
-    if path.shapes is not None:
-        path.shapes.save(folder / "shapes.npz")
-    save_plot(path, folder / "path.png")
-    print(summary(path))
-    print(f"written to {folder}")
+    write(path, "fold_by_angle_with_snap")

@@ -5,17 +5,14 @@ to rest, stopped at every peak of its kinetic energy. Each state agrees with New
 
     python -m scenarios.fold_by_dynamic_relaxation [DIR]
 
-writes path.json, path.png and shapes.npz to DIR (default: out/fold_by_dynamic_relaxation).
+writes path.json, shapes.npz, path.png and path.rrd to DIR (default:
+out/fold_by_dynamic_relaxation).
 """
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import der
-from der.summary import summary
-from der.view_plots import save_plot
+from scenarios.output import write
 
 scene = der.Scene(
     der.circle(),
@@ -27,11 +24,4 @@ scene = der.Scene(
 path = der.fold(scene)
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/fold_by_dynamic_relaxation")
-    folder.mkdir(parents=True, exist_ok=True)
-    path.save(folder / "path.json")
-    if path.shapes is not None:
-        path.shapes.save(folder / "shapes.npz")
-    save_plot(path, folder / "path.png")
-    print(summary(path))
-    print(f"written to {folder}")
+    write(path, "fold_by_dynamic_relaxation")
