@@ -32,6 +32,7 @@ from der.equilibrium import (
     moved,
 )
 from der.frames import rotation_vector
+from der.path import FIRST_STEP, LARGEST_STEP, SMALLEST_STEP
 from der.relaxation import Relaxed, relax
 from der.rod import State
 from der.sector import Sector
@@ -40,9 +41,6 @@ from der.special import Visit, Wanted, special_points, three_covered, visit
 from der.stability import all_modes
 from der.step import Step, Stuck, Tally
 
-FIRST_STEP = 0.05
-LARGEST_STEP = 0.6
-SMALLEST_STEP = 1e-7
 _ANGLE = 0.12  # rad, aimed at between tangents of neighbouring states
 _SHARPEST = 0.4  # rad, a step that turns more is repeated shorter
 _WIDEST = 0.2  # bulge of a step; more is another part of the path

@@ -70,14 +70,6 @@ def tangent(q, out_d3):
     out_d3[2] = q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]
 
 
-def turned_all(quat: Array, w: Array) -> Array:
-    """Frames ``quat`` (n, 4), each turned by its own rotation vector ``w`` (n, 3) [rad]."""
-    out = np.empty_like(quat)
-    for q, v, o in zip(quat, w, out, strict=True):
-        turned(q, v, o)
-    return out
-
-
 def rotation(quat: Array) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); their columns are d1, d2, d3."""
     q0, q1, q2, q3 = np.moveaxis(quat, -1, 0)
@@ -87,21 +79,6 @@ def rotation(quat: Array) -> Array:
         [2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0**2 - q1**2 - q2**2 + q3**2],
     ]
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
-def product(p: Array, q: Array) -> Array:
-    """Quaternion products p o q (..., 4): the rotation q, then p (both in the global basis)."""
-    p0, p1, p2, p3 = np.moveaxis(p, -1, 0)
-    q0, q1, q2, q3 = np.moveaxis(q, -1, 0)
-    return np.stack(
-        [
-            p0 * q0 - p1 * q1 - p2 * q2 - p3 * q3,
-            p0 * q1 + p1 * q0 + p2 * q3 - p3 * q2,
-            p0 * q2 - p1 * q3 + p2 * q0 + p3 * q1,
-            p0 * q3 + p1 * q2 - p2 * q1 + p3 * q0,
-        ],
-        axis=-1,
-    )
 
 
 @njit(cache=True)

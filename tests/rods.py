@@ -14,7 +14,7 @@ from der.equilibrium import (
     equilibrium,
     moved,
 )
-from der.frames import Array, rotation, turned_all
+from der.frames import Array, rotation, turned
 from der.linking import unfold
 from der.rod import Rod, State, rod
 from der.sector import Sector
@@ -23,6 +23,14 @@ from der.supports import Supports
 
 E1, E2, E3 = np.eye(3)
 MEASURES = ("logarithm", "angle", "tangent")
+
+
+def turned_all(quat: Array, w: Array) -> Array:
+    """Frames ``quat`` (n, 4), each turned by its own rotation vector ``w`` (n, 3) [rad]."""
+    out = np.empty_like(quat)
+    for q, v, o in zip(quat, w, out, strict=True):
+        turned(q, v, o)
+    return out
 
 
 # --- rods and states ------------------------------------------------------------------------

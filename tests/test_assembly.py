@@ -6,9 +6,10 @@ import classical
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rods import turned_all
 
 from der.assembly import System, assemble, take_out
-from der.frames import rotation, turned_all
+from der.frames import rotation
 from der.rod import Rod, State, edges, rod, strains
 from der.supports import Supports, supports
 

@@ -6,6 +6,7 @@ import classical
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rods import turned_all
 from scipy.spatial.transform import Rotation
 
 from der.frames import (
@@ -15,7 +16,6 @@ from der.frames import (
     rotation_vector,
     tangent,
     turned,
-    turned_all,
 )
 
 SEEDS = pytest.mark.parametrize("seed", range(5))

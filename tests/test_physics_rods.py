@@ -21,6 +21,7 @@ from rods import (
     solved,
     straight,
     turned_about,
+    turned_all,
     turned_rigidly,
     unloaded,
 )
@@ -28,7 +29,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, jv
 
 from der.assembly import assemble
-from der.frames import rotation, turned_all
+from der.frames import rotation
 from der.rod import State, edges, rod
 from der.sector import free_ring
 from der.supports import supports

@@ -4,10 +4,11 @@ import classical
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rods import turned_all
 from scipy.spatial.transform import Rotation
 from scipy.special import hyp2f1, zeta
 
-from der.frames import turned, turned_all
+from der.frames import turned
 from der.rod import Rod, State, rod, strains
 from der.strain import _arc_coefficient, arctangent_quotient, vertex_energy
 
