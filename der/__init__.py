@@ -10,11 +10,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from der.folding import Interrupted, NotConverged, fold
+    from der.folding import fold
     from der.record import Path, Point
     from der.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.scene import Scene
     from der.sections import Scale, Section, rectangular_section, section
+    from der.unfinished import Interrupted, NotConverged
 
 __all__ = [
     "Interrupted",
@@ -36,11 +37,12 @@ __all__ = [
 ]
 
 _HOME = {
-    "folding": ("fold", "Interrupted", "NotConverged"),
+    "folding": ("fold",),
     "record": ("Path", "Point"),
     "ring": ("Ring", "circle", "ellipse", "profile", "rectangle", "triangle"),
     "scene": ("Scene",),
     "sections": ("Scale", "Section", "rectangular_section", "section"),
+    "unfinished": ("Interrupted", "NotConverged"),
 }
 
 

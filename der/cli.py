@@ -6,15 +6,18 @@ Exit codes: 0 done; 2 bad input, in one line that names the option, the value an
 
 from __future__ import annotations
 
+import inspect
 import math
-import os
 import sys
-import tempfile
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
+
+from der.output import OUTPUT, UNSAVED, check_writable, say, show, targets, whereabouts, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,11 +26,16 @@ if TYPE_CHECKING:
     from der.ring import Ring
     from der.scene import Scene
     from der.sections import Section
+    from der.view_rerun import Live
 
-SHAPES = ("circle",)
+SHAPES = {  # and the options that go with each
+    "circle": ("natural_curvature",),
+    "ellipse": ("b_over_a",),
+    "rectangle": ("b_over_a", "r_over_a"),
+    "triangle": ("vertex_angle", "r_over_a"),
+    "profile": (),
+}
 NU = 0.3  # Poisson's ratio where none is given
-UNSAVED = File("der-unfinished.json")  # where an unfinished path goes if no file was named
-OUTPUT = File("-")  # standard output
 
 app = typer.Typer(
     help="Discrete elastic rods for rings that fold by twisting.",
@@ -46,12 +54,12 @@ def main(arguments: list[str] | None = None) -> None:
         text = " ".join(str(getattr(wrong, "message", wrong)).split())
         if hasattr(wrong, "format_message"):
             text = " ".join(wrong.format_message().split())
-        _say(f"der: {text}")
+        say(f"der: {text}")
         code = 2
     except (typer.Abort, KeyboardInterrupt):
         code = 130
     except OSError as wrong:  # a full disk behind standard output, for one
-        _say(f"der: {wrong}")
+        say(f"der: {wrong}")
         code = 3
     sys.exit(code or 0)
 
@@ -70,23 +78,6 @@ def _whole(text: str) -> int:
         return int(text)
     except ValueError:
         raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr)
-
-
-def _show(text: str) -> bool:
-    """Print on standard output; False, in words, where it takes no more."""
-    try:
-        print(text, flush=True)
-    except OSError as wrong:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush
-        if isinstance(wrong, BrokenPipeError):
-            return True  # whoever read our output has had enough
-        _say(f"der: could not write to standard output: {wrong.strerror}")
-        return False
-    return True
 
 
 def _show_version(wanted: bool) -> None:
@@ -114,122 +105,225 @@ def _options_named() -> Iterator[None]:
         yield
     except ValueError as wrong:
         words = str(wrong).split(" ", 1)
-        option = {"n_edges": "edges"}.get(words[0], words[0]).replace("_", "-")
+        option = {"n_edges": "edges", "twist_axis": "axis"}.get(words[0], words[0])
+        option = option.replace("_", "-")
         raise typer.TyperException(" ".join([f"--{option}", *words[1:]])) from None
 
 
-@app.command()
-def fold(
-    shape: Annotated[str, typer.Argument(metavar="SHAPE", help="The ring: circle.")],
-    h_over_t: Annotated[
-        float | None, typer.Option(parser=_number, help="Height over thickness of the section.")
-    ] = None,
-    alpha: Annotated[
-        float | None, typer.Option(parser=_number, help="EI1/GJ, with --beta.")
-    ] = None,
-    beta: Annotated[
-        float | None, typer.Option(parser=_number, help="EI2/GJ, with --alpha.")
-    ] = None,
-    nu: Annotated[
-        float, typer.Option(parser=_number, help="Poisson's ratio, with --h-over-t.")
-    ] = NU,
-    natural_curvature: Annotated[
-        float,
-        typer.Option(parser=_number, help="Natural curvature of the circle, in units of 1/a."),
-    ] = 1.0,
-    a_over_t: Annotated[
-        float,
-        typer.Option(
-            parser=_number, help="Reference length over thickness: finite stretch and drawing."
+# --- What commands have in common ------------------------------------------------------------
+
+
+def _number_option(text: str, **more: Any) -> Any:
+    """An option that takes a number."""
+    return typer.Option(parser=_number, help=text, **more)
+
+
+@dataclass(frozen=True)
+class RingOptions:
+    """A ring and its section."""
+
+    shape: Annotated[
+        str, typer.Argument(metavar="SHAPE", help="The ring: " + ", ".join(SHAPES) + ".")
+    ]
+    file: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[FILE]", help="Of a profile: CSV of arc_length, curvature or x, y."
         ),
-    ] = 200.0,
-    axis: Annotated[str, typer.Option(help="Twisting axis: x or y.")] = "x",
-    edges: Annotated[int, typer.Option(parser=_whole, help="Edges of the full ring.")] = 64,
-    gamma_max: Annotated[
-        float, typer.Option(parser=_number, help="Where the path ends, rad.")
-    ] = math.pi,
+    ] = None
+    b_over_a: Annotated[
+        float | None, _number_option("Short semi-axis over the long one, ellipse and rectangle.")
+    ] = None
+    r_over_a: Annotated[
+        float | None, _number_option("Radius of the fillets, rectangle and triangle.")
+    ] = None
+    vertex_angle: Annotated[
+        float | None, _number_option("Angle at the apex of a triangle, degrees.")
+    ] = None
+    natural_curvature: Annotated[
+        float | None, _number_option("Natural curvature of a circle, in units of 1/a.")
+    ] = None
+    axis: Annotated[
+        str, typer.Option(help="Twisting axis: x (grips at the short semi-axis) or y.")
+    ] = "x"
+    h_over_t: Annotated[float | None, _number_option("Height over thickness of the section.")] = (
+        None
+    )
+    alpha: Annotated[float | None, _number_option("EI1/GJ, with --beta.")] = None
+    beta: Annotated[float | None, _number_option("EI2/GJ, with --alpha.")] = None
+    nu: Annotated[float, _number_option("Poisson's ratio, with --h-over-t.")] = NU
+    a_over_t: Annotated[
+        float, _number_option("Reference length over thickness: finite stretch and drawing.")
+    ] = 200.0
+
+    def ring(self) -> Ring:
+        """The ring that the command line describes."""
+        from der import ring as rings
+
+        if self.shape not in SHAPES:
+            raise typer.TyperException(f"SHAPE must be {', '.join(SHAPES)}, got {self.shape!r}")
+        own = SHAPES[self.shape]
+        for name in ("b_over_a", "r_over_a", "vertex_angle", "natural_curvature"):
+            value = getattr(self, name)
+            if value is not None and name not in own:
+                takers = [shape for shape, takes in SHAPES.items() if name in takes]
+                raise ValueError(f"{name} must go with SHAPE {' or '.join(takers)}, got {value}")
+            if value is None and name in own and self.shape != "circle":
+                raise ValueError(f"{name} must be given with SHAPE {self.shape}, got none")
+        if (self.file is None) is (self.shape == "profile"):
+            raise typer.TyperException(
+                f"FILE must be given with SHAPE profile, and with it only, got {self.file!r}"
+            )
+        if self.axis not in ("x", "y"):
+            raise ValueError(f"axis must be x or y, got {self.axis!r}")
+        if self.shape in ("triangle", "profile") and self.axis == "y":
+            raise ValueError(f"axis must be x for a {self.shape}, its axis of symmetry, got 'y'")
+        if self.shape == "circle":  # both axes are alike
+            return rings.circle(1.0 if self.natural_curvature is None else self.natural_curvature)
+        if self.shape == "profile":
+            from der.profile_files import read_profile
+
+            return read_profile(str(self.file))
+        values = {name: getattr(self, name) for name in own}
+        if self.shape == "triangle":
+            return rings.triangle_in_degrees(**values)
+        make: Any = {"ellipse": rings.ellipse, "rectangle": rings.rectangle}[self.shape]
+        return make(**values, twist_axis=self.axis)
+
+    def section(self) -> Section:
+        """The section that the command line describes."""
+        return _section(self.h_over_t, self.alpha, self.beta, self.nu)
+
+
+@dataclass(frozen=True)
+class PathOptions:
+    """What is wanted of a path, and how it is found."""
+
+    edges: Annotated[int, typer.Option(parser=_whole, help="Edges of the full ring.")] = 64
+    gamma_max: Annotated[float, _number_option("Where the path ends, rad.")] = math.pi
     until: Annotated[
         str | None, typer.Option(help="'folded': until the three-covered state, beyond pi too.")
-    ] = None,
+    ] = None
     save_at: Annotated[
         str | None, typer.Option(help="Solve at these gammas (rad, commas), not at k pi/8.")
-    ] = None,
+    ] = None
     curvature: Annotated[
         str, typer.Option(help="Measure of curvature: logarithm, angle or tangent.")
-    ] = "logarithm",
-    stretch: Annotated[str, typer.Option(help="inextensible or finite (EA).")] = "inextensible",
+    ] = "logarithm"
+    stretch: Annotated[str, typer.Option(help="inextensible or finite (EA).")] = "inextensible"
     tolerance: Annotated[
-        float, typer.Option(parser=_number, help="Residual of an equilibrium, GJ/a.")
-    ] = 1e-10,
+        float | None,
+        _number_option("fold: residual of an equilibrium, GJ/a, 1e-10; bvp: relative error, 1e-8."),
+    ] = None
     stability: Annotated[
         bool, typer.Option("--stability/--no-stability", help="Index of the full ring.")
-    ] = True,
+    ] = True
     control: Annotated[
         str, typer.Option(help="arclength (through folds), angle or moment (with snaps).")
-    ] = "arclength",
+    ] = "arclength"
     unload: Annotated[
         bool, typer.Option("--unload", help="Come back to 0, with --control angle.")
-    ] = False,
-    solver: Annotated[
-        str, typer.Option(help="newton, or relaxation with --control angle.")
-    ] = "newton",
+    ] = False
+    solver: Annotated[str, typer.Option(help="newton, or relaxation with --control angle.")] = (
+        "newton"
+    )
     error_bars: Annotated[
         bool, typer.Option("--error-bars", help="Extrapolate from N, N/2, N/4 edges, with errors.")
-    ] = False,
-    sector: Annotated[str, typer.Option(help="auto, full, half or quarter.")] = "auto",
+    ] = False
+    sector: Annotated[str, typer.Option(help="auto, full, half or quarter.")] = "auto"
+
+    def scene(self, ring: RingOptions, **more: Any) -> Scene:
+        """The scene that the command line describes."""
+        from der.scene import Scene
+
+        wanted: dict[str, Any] = {
+            "n_edges": self.edges,
+            "sector": self.sector,
+            "stability": self.stability,
+            "error_bars": self.error_bars,
+            "control": self.control,
+            "unload": self.unload,
+            "solver": self.solver,
+            "gamma_max": self.gamma_max,
+            "until": self.until,
+            "save_at": _numbers("save_at", self.save_at),
+            "curvature": self.curvature,
+            "stretch": self.stretch,
+            "a_over_t": ring.a_over_t,
+        }
+        if self.tolerance is not None:
+            wanted["tolerance"] = self.tolerance
+        return Scene(ring.ring(), ring.section(), **wanted | more)
+
+
+@dataclass(frozen=True)
+class FileOptions:
+    """What is written."""
+
     json: Annotated[
         str | None, typer.Option(metavar="F", help="Write the record here ('-': output).")
-    ] = None,
+    ] = None
     plot: Annotated[
         str | None, typer.Option(metavar="F", help="Draw the path: .png, .pdf or .svg.")
-    ] = None,
+    ] = None
     rrd: Annotated[
         str | None, typer.Option(metavar="F", help="Record for playback with rerun: .rrd.")
-    ] = None,
+    ] = None
     out: Annotated[
         str | None,
         typer.Option(metavar="DIR", help="Write path.json, path.png and shapes.npz here."),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False,
-) -> None:
-    """Fold a ring: the path of equilibria from flat on, its folds, and the index of every state."""
-    from der.scene import Scene
+    ] = None
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False
 
-    with _options_named():
-        ring = _ring(shape, axis, natural_curvature)
-        section = _section(h_over_t, alpha, beta, nu)
-        scene = Scene(
-            ring,
-            section,
-            n_edges=edges,
-            sector=sector,
-            stability=stability,
-            error_bars=error_bars,
-            control=control,
-            unload=unload,
-            solver=solver,
-            shapes=any(file is not None for file in (plot, rrd, out)),
-            gamma_max=gamma_max,
-            until=until,
-            save_at=_numbers("save_at", save_at),
-            curvature=curvature,
-            stretch=stretch,
-            a_over_t=a_over_t,
-            tolerance=tolerance,
-        )
-        targets = _targets(json, plot, rrd, out)
-    raise typer.Exit(_fold(scene, targets, quiet=quiet))
+    @property
+    def drawn(self) -> bool:
+        """Whether shapes are needed."""
+        return any(file is not None for file in (self.plot, self.rrd, self.out))
+
+    def targets(self) -> dict[str, File]:
+        """The files to write, after making sure that they can be written."""
+        return targets(self.json, self.plot, self.rrd, self.out)
 
 
-def _ring(shape: str, axis: str, natural_curvature: float) -> Ring:
-    """The ring that the command line describes."""
-    from der.ring import circle
+@dataclass(frozen=True)
+class LiveOptions:
+    """Watching."""
 
-    if shape not in SHAPES:
-        raise typer.TyperException(f"SHAPE must be {', '.join(SHAPES)}, got {shape!r}")
-    if axis not in ("x", "y"):
-        raise ValueError(f"axis must be x or y, got {axis!r}")
-    return circle(natural_curvature)  # both axes of a circle are alike
+    live: Annotated[
+        bool, typer.Option("--live", help="Serve what --rrd records for watching, until Ctrl-C.")
+    ] = False
+    port: Annotated[int, typer.Option(parser=_whole, help="Where --live serves.")] = 9876
+
+
+def _command(*groups: Any) -> Callable[[Callable[..., int]], Callable[..., None]]:
+    """Make a command of a function of groups of options; what it returns is the exit code.
+
+    The command's parameters are the groups' fields, so that commands share options and not text.
+    """
+
+    def wrap(function: Callable[..., int]) -> Callable[..., None]:
+        def run(**given: Any) -> None:
+            made = [group(**{f.name: given[f.name] for f in fields(group)}) for group in groups]
+            raise typer.Exit(function(*made))
+
+        hints = {name: h for g in groups for name, h in get_type_hints(g, None, None, True).items()}
+        parameters = [
+            inspect.Parameter(
+                f.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=inspect.Parameter.empty if f.default is MISSING else f.default,
+                annotation=hints[f.name],
+            )
+            for group in groups
+            for f in fields(group)
+        ]
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = hints
+        run.__doc__ = function.__doc__
+        app.command(name=function.__name__.strip("_"))(run)
+        return run
+
+    return wrap
 
 
 def _section(h_over_t: float | None, alpha: float | None, beta: float | None, nu: float) -> Section:
@@ -268,94 +362,205 @@ def _numbers(name: str, text: str | None) -> tuple[float, ...] | None:
         raise ValueError(f"{name} must be numbers separated by commas, got {text!r}") from None
 
 
-def _targets(
-    json: str | None, plot: str | None, rrd: str | None, out: str | None
-) -> dict[str, File]:
-    """The files to write, after making sure that they can be written."""
-    targets: dict[str, File] = {}
-    if out is not None:
+# --- The commands ----------------------------------------------------------------------------
+
+
+@_command(RingOptions, PathOptions, FileOptions, LiveOptions)
+def fold(ring: RingOptions, path: PathOptions, files: FileOptions, watch: LiveOptions) -> int:
+    """Fold a ring: the path of equilibria from flat on, its folds, and the index of every state."""
+    with _options_named():
+        playback = watch.live or files.rrd is not None
+        scene = path.scene(
+            ring,
+            shapes=playback or files.drawn,
+            history=playback,
+            modes=playback and path.stability and path.solver == "newton",
+        )
+        written = files.targets()
+        served = _served(watch.port) if watch.live else nullcontext()
+    from der.folding import fold as solve
+
+    with served as shown:
+
+        def run(progress: Callable[[float], object] | None) -> Path:
+            return solve(scene, progress=progress, watch=None if shown is None else shown.show)
+
+        found, code = _follow(run, scene, written, quiet=files.quiet)
+        if shown is not None and len(found) and found.status != "interrupted":
+            _keep_showing(shown, found)
+    return code
+
+
+@_command(RingOptions, PathOptions, FileOptions)
+def bvp(ring: RingOptions, path: PathOptions, files: FileOptions) -> int:
+    """Solve the boundary-value problem: the same path, to the error that you ask for."""
+    with _options_named():
+        from validation.solving import TOLERANCE, check, solve
+
+        tolerance = TOLERANCE if path.tolerance is None else path.tolerance
+        scene = path.scene(ring, shapes=files.drawn, error_bars=False, tolerance=1e-10)
+        check(scene, tolerance)
+        written = files.targets()
+
+    def run(progress: Callable[[float], object] | None) -> Path:
+        return solve(scene, tolerance=tolerance, progress=progress)
+
+    return _follow(run, scene, written, quiet=files.quiet)[1]
+
+
+@dataclass(frozen=True)
+class ComparisonFiles:
+    """What a comparison writes."""
+
+    json: Annotated[
+        str | None, typer.Option(metavar="F", help="Write both records and differences here.")
+    ] = None
+    plot: Annotated[
+        str | None, typer.Option(metavar="F", help="Draw both: .png, .pdf or .svg.")
+    ] = None
+    out: Annotated[
+        str | None, typer.Option(metavar="DIR", help="Write comparison.json and .png here.")
+    ] = None
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no table.")] = False
+
+
+@_command(RingOptions, PathOptions, ComparisonFiles)
+def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int:
+    """Hold the rod against the boundary-value problem, state by state, with their error bars."""
+    with _options_named():
+        from validation.solving import TOLERANCE, check
+
+        scene = path.scene(ring, error_bars=True)
+        check(scene, TOLERANCE)
+        written = targets(files.json, files.plot, None, files.out, stem="comparison")
+        written.pop("shapes", None)
+    from der.folding import fold as solve
+    from der.unfinished import Interrupted, NotConverged
+    from validation.comparison import compare as compared
+    from validation.comparison import table
+
+    try:
+        with _progress(scene, quiet=files.quiet) as tick:
+            found = compared(scene, solve(scene, progress=tick), progress=tick)
+    except (NotConverged, Interrupted) as unfinished:
+        code = 3 if isinstance(unfinished, NotConverged) else 130
+        return _finish(unfinished.path, {}, code, quiet=files.quiet)
+    code = 0
+    for name, file in written.items():
+        try:
+            if name == "plot":
+                from validation.comparison_plot import save_comparison
+
+                save_comparison(found, file)
+            elif file != OUTPUT:
+                found.save(file)
+        except OSError as wrong:
+            say(f"der: could not write {file}: {wrong}")
+            code = 3
+    text = found.to_json().rstrip() if written.get("json") == OUTPUT else table(found)
+    if (not files.quiet or written.get("json") == OUTPUT) and not show(text):
+        code = 3
+    return code
+
+
+@app.command()
+def figure(
+    names: Annotated[
+        list[str], typer.Argument(metavar="NAME...", help="fig2b, fig3b, ..., or all.")
+    ],
+    out: Annotated[str, typer.Option(metavar="DIR", help="The folder to write to.")],
+    workers: Annotated[
+        int | None, typer.Option(parser=_whole, help="Processes; one a core if not given.")
+    ] = None,
+) -> None:
+    """Draw the paper's figures: PNG, and the data as CSV."""
+    with _options_named():
+        from validation.figures import draw
+
         folder = File(out)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as wrong:
             raise ValueError(f"out must be a folder, got {out!r}: {wrong.strerror}") from None
-        targets = {
-            "json": folder / "path.json",
-            "plot": folder / "path.png",
-            "shapes": folder / "shapes.npz",
-        }
-    if json is not None:
-        targets["json"] = File(json)
-    if plot is not None:
-        from der.view_plots import FORMATS
-
-        if File(plot).suffix not in FORMATS:
-            raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
-        targets["plot"] = File(plot)
-    if rrd is not None:
-        if File(rrd).suffix != ".rrd":
-            raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
-        targets["rrd"] = File(rrd)
-    if targets.get("json") in [targets[name] for name in ("plot", "shapes") if name in targets]:
-        raise ValueError(f"json must be a file of its own, got {json!r} twice")
-    for name, file in targets.items():
-        if file != OUTPUT:
-            _check_writable(name if name != "shapes" else "out", file)
-    return targets
+        check_writable("out", folder / "figure.png")
+        done = draw(names, folder, workers=workers)
+    for file in done.written:
+        show(str(file))
+    for name, reason in done.failed.items():
+        say(f"der: {name} failed: {reason}")
+    raise typer.Exit(3 if done.failed else 0)
 
 
-def _check_writable(name: str, file: File) -> None:
-    """Raise ValueError where ``file`` cannot be written, before hours are spent on it."""
-    if file.is_dir():
-        raise ValueError(f"{name} must be a file, got the folder {str(file)!r}")
-    if file.exists() and not file.is_file():  # it would be replaced by a file: /dev/null!
-        raise ValueError(f"{name} must be a regular file, got {str(file)!r}")
-    try:
-        with tempfile.TemporaryFile(dir=file.parent):
-            pass
-    except OSError as wrong:
-        raise ValueError(
-            f"{name} must be a file in a folder that can be written to, got {str(file)!r}: "
-            f"{wrong.strerror}"
-        ) from None
+@app.command()
+def bench(
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write the rows here.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions and sizes.")] = False,
+) -> None:
+    """Measure CPU time, memory and error of paths and kernels, on this machine, in one run."""
+    from validation.bench import run
+
+    with _options_named():
+        if json is not None:
+            check_writable("json", File(json))
+    run(None if json is None else File(json), quick=quick)
 
 
-def _fold(scene: Scene, targets: dict[str, File], *, quiet: bool) -> int:
-    """Follow the path, write what was asked for, and return the exit code."""
-    from der.folding import Interrupted, NotConverged
-    from der.folding import fold as run
+# --- From the scene to the files -------------------------------------------------------------
+
+
+def _follow(
+    run: Callable[[Callable[[float], object] | None], Path],
+    scene: Scene,
+    written: dict[str, File],
+    *,
+    quiet: bool,
+) -> tuple[Path, int]:
+    """Follow the path, write what was asked for, and return it with the exit code."""
+    from der.unfinished import Interrupted, NotConverged
 
     code = 0
     try:
         with _progress(scene, quiet=quiet) as tick:
-            path = run(scene, progress=tick)
+            path = run(tick)
     except (NotConverged, Interrupted) as unfinished:
         path = unfinished.path
         code = 3 if isinstance(unfinished, NotConverged) else 130
-        file = targets.setdefault("json", UNSAVED)
-        targets.setdefault("shapes", (UNSAVED if file == OUTPUT else file).with_suffix(".npz"))
-    if not _write(path, targets):
+    return path, _finish(path, written, code, quiet=quiet)
+
+
+def _finish(path: Path, written: dict[str, File], code: int, *, quiet: bool) -> int:
+    """Write a path, finished or not, say what there is to say, and return the exit code."""
+    if path.status != "done":
+        file = written.setdefault("json", UNSAVED)
+        written.setdefault("shapes", (UNSAVED if file == OUTPUT else file).with_suffix(".npz"))
+    if not write(path, written):
         code = code or 3
     if path.status != "done":
-        _say(f"der: {path.message}; {_whereabouts(path, targets)}")
-    if not quiet and targets.get("json") != OUTPUT:
+        say(f"der: {path.message}; {whereabouts(path, written)}")
+    if not quiet and written.get("json") != OUTPUT:
         from der.summary import summary
 
-        if not _show(summary(path)):
+        if not show(summary(path)):
             code = code or 3
     return code
 
 
-def _whereabouts(path: Path, targets: dict[str, File]) -> str:
-    """Where an unfinished path went, and how far it got."""
-    file = targets["json"]
-    place = "on standard output" if file == OUTPUT else f"in {file}"
-    if not len(path):
-        return f"the record, without any state, is {place}"
-    last = f"at gamma = {path.gamma[-1]:.8g}"
-    return (
-        f"the path up to its last good state, {last}, is {place}, its shapes in {targets['shapes']}"
-    )
+def _served(port: int) -> Live:
+    """What is watched while it is made, its address told."""
+    from der.view_rerun import Live
+
+    live = Live(port)
+    say(f"der: to watch, run: rerun {live.address}")
+    return live
+
+
+def _keep_showing(live: Live, path: Path) -> None:
+    """Serve the whole film until Ctrl-C."""
+    with suppress(KeyboardInterrupt):
+        live.finish(path)
+        say("der: the film can be watched until Ctrl-C")
+        while True:
+            time.sleep(3600.0)
 
 
 @contextmanager
@@ -383,51 +588,3 @@ def _progress(scene: Scene, *, quiet: bool) -> Iterator[Callable[[float], object
             bar.update(task, completed=gamma, total=scene.gamma_max, description=text)
 
         yield tick
-
-
-def _write(path: Path, targets: dict[str, File]) -> bool:
-    """Write the record first, then what goes with it; say what could not be written.
-
-    A record that cannot be written where it should goes to standard output, also in ``targets``:
-    nothing already computed is lost.
-    """
-    done = True
-    for name in ("json", "shapes", "plot", "rrd"):
-        file = targets.get(name)
-        if file is None:
-            continue
-        try:
-            if name == "json" and file != OUTPUT:
-                path.save(file)
-            elif name == "shapes" and path.shapes is not None:
-                path.shapes.save(file)
-            elif name == "plot" and len(path) > 1:
-                from der.view_plots import save_plot
-
-                save_plot(path, file)
-            elif name == "rrd" and len(path) > 1:
-                from der.view_rerun import save_recording
-
-                save_recording(path, file)
-        except (OSError, ValueError) as wrong:
-            done = False
-            _say(f"der: could not write {file}: {wrong}")
-            if name == "json":
-                targets["json"] = OUTPUT
-        if name == "json" and targets["json"] == OUTPUT:
-            done = _show(path.to_json()) and done
-    return done
-
-
-@app.command()
-def bench(
-    json: Annotated[str | None, typer.Option(metavar="F", help="Write the rows here.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions and sizes.")] = False,
-) -> None:
-    """Measure CPU time, memory and error of paths and kernels, on this machine, in one run."""
-    from validation.bench import run
-
-    with _options_named():
-        if json is not None:
-            _check_writable("json", File(json))
-    run(None if json is None else File(json), quick=quick)

@@ -1,17 +1,7 @@
 """Error bars: the path on N, N/2 and N/4 edges, extrapolated state by state (Richardson, Romberg).
 
-Frames sit on the same material points at every resolution, so every second (fourth) frame of a
-state on N edges is nearly a state on N/2 (N/4), and Newton's method makes it one in two or three
-iterations, folds or not, if its corrections stay in the plane normal to the path of N edges:
-
-    N      ----o---->  tangent        the three states of a plane are *matched*: gamma, M, U and
-    N/2    ....|.....                 their rates along the tangent have errors in even powers
-    N/4    ....|.....                 of h, h^2 first
-
-What is sought (a gamma that was asked for, a fold, a limit) is a root, along the path of N edges,
-of the extrapolated curve. An error is the last correction that the extrapolation made.
-
-Sources: Richardson (1911), Phil. Trans. A 210; Romberg (1955), K. Norske Vid. Selsk. Forh. 28.
+The states of the three meshes are matched one by one, and put where they belong on the extrapolated
+curve (`matching`). An error is the last correction that the extrapolation made.
 """
 
 from __future__ import annotations
@@ -20,25 +10,15 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from der.equilibrium import Control, Direction, Equilibrium, dot, equilibrium, moved
 from der.frames import Array, rotation_vector
-from der.rod import State
+from der.matching import ENERGY, GAMMA, LEVELS, MOMENT, RATE, Family, Place, placed, romberg
 from der.sector import Sector
 from der.special import Visit
 
-LEVELS = 3
-GAMMA, MOMENT, ENERGY = 0, 1, 2  # columns of a table of values
-RATE = 3  # added to these: columns of the rates along the path
-
-_PROBE = 1e-3  # of s: the first step towards a fold or limit, whose second derivative is not known
-_SMALL = 1e-6  # of s: a step that is as good as its linear prediction, to the square of this
-_FARTHEST = 0.3  # of s: about two steps of the path; what is sought lies h^2 away
-_MOST = 12  # steps of the secant method
 _EXACT = 1e-9  # of the largest values: a state that is the same on every mesh, as the folded one
 _REST = 3.0  # see `_Corrections.bound`
 
@@ -98,8 +78,8 @@ def error_bars(
     would be that of the other side. Branch and contact points are placed on N edges only; they have
     values on the extrapolated curve, but no errors.
     """
-    family = _Family(tuple(pieces), tolerance)
-    places = [_placed(family, visit, asked) for visit in visits]
+    family = Family(tuple(pieces), tolerance)
+    places = [placed(family, visit, asked) for visit in visits]
     order = _order(_arc_lengths(pieces[0], visits), places)
     scales = _scales(family, visits)
     kept = [places[k] for k in order]
@@ -128,196 +108,6 @@ def error_bars(
     )
 
 
-class _Matched(NamedTuple):
-    """Three matched states."""
-
-    table: Array  # (LEVELS, 6) gamma, M, U and their rates per s, finest level first
-    residual: float  # the largest of the three
-
-
-@dataclass(frozen=True)
-class _Family:
-    """The curves of equilibria on three meshes, matched along the finest."""
-
-    pieces: tuple[Sector, ...]
-    tolerance: float
-
-    def values(self, level: int, at: Equilibrium) -> tuple[float, float, float]:
-        """Return gamma [rad], M of one arm [GJ/a] and U of the full ring [GJ/a]."""
-        piece = self.pieces[level]
-        return at.state.load, piece.moment(at.moment), piece.copies * at.energy
-
-    def matched(self, fine: Equilibrium) -> _Matched | None:
-        """The states matched to one on the finest mesh; None where a level has none."""
-        q, load = fine.tangent.q, fine.tangent.load
-        speed = dot(self.pieces[0].body, _normal(self.pieces[0], q, load), fine.tangent)
-        lines, state, residual = [self._line(0, fine, 1.0)], fine.state, fine.residual
-        for level, piece in enumerate(self.pieces[1:], start=1):
-            q = np.ascontiguousarray(q[::2])
-            row = _normal(piece, q, load)
-            at = equilibrium(
-                piece.body,
-                piece.held,
-                _coarser(state),
-                along=row,
-                control=Control.DIRECTION,
-                tolerance=self.tolerance,
-            )
-            if not at.converged:
-                return None
-            lines.append(self._line(level, at, speed / dot(piece.body, row, at.tangent)))
-            state, residual = at.state, max(residual, at.residual)
-        return _Matched(np.array(lines), residual)
-
-    def _line(self, level: int, at: Equilibrium, speed: float) -> tuple[float, ...]:
-        """Values and rates at a level; ``speed`` turns the unit tangent to a rate per s."""
-        gamma, moment, energy = self.values(level, at)
-        gamma_rate = speed * at.tangent.load
-        moment_rate = speed * self.pieces[level].moment(at.moment_rate)
-        return gamma, moment, energy, gamma_rate, moment_rate, 4.0 * moment * gamma_rate
-
-    def near(self, base: Equilibrium, s: float) -> _Matched | None:
-        """The matched states at the distance ``s`` along the path of the finest mesh."""
-        piece, t = self.pieces[0], base.tangent
-        at = equilibrium(
-            piece.body,
-            piece.held,
-            moved(piece.held, base.state, Direction(s * t.q, s * t.force, s * t.load)),
-            along=t,
-            control=Control.DIRECTION,
-            tolerance=self.tolerance,
-        )
-        return self.matched(at) if at.converged else None
-
-
-def _normal(piece: Sector, q: Array, load: float) -> Direction:
-    """The direction of rates ``q`` (n, b) of the frames and ``load`` of gamma, as a normal.
-
-    Notes
-    -----
-    Its product with another direction is the trapezoidal rule for the integral of the product of
-    both rotations, the grips' included: they turn with gamma and are no entries of q. Without them
-    an end of the integral would be missing, and the series in h would have odd powers.
-    """
-    grips = float(np.sum(piece.body.mass[:, 0] * piece.held.turn**2))
-    return Direction(q, np.zeros(len(piece.held.target)), grips * load)
-
-
-def _coarser(state: State) -> State:
-    """Every second frame of a state."""
-    return state.but(
-        quat=np.ascontiguousarray(state.quat[::2]), stretch=np.ascontiguousarray(state.stretch[::2])
-    )
-
-
-def romberg(levels: Array) -> Array:
-    """Values at h, the same less their h^2 term, and less their h^4 term: (3, ...) as ``levels``.
-
-    Parameters
-    ----------
-    levels : (3, ...) values at h, 2h and 4h, with errors in even powers of h.
-    """
-    once = (4.0 * levels[:-1] - levels[1:]) / 3.0
-    return np.array([levels[0], once[0], (16.0 * once[0] - once[1]) / 15.0])
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A state of the extrapolated curve, and how an error of the curve moves it.
-
-    Notes
-    -----
-    What is sought is F(s) = 0, F a column of the table less a constant. If the curve is off by
-    c(s), the root is off by ds = -c_F/F', and the values there by c + rates ds.
-    """
-
-    s: float  # distance from the visit along the path
-    table: Array  # (LEVELS, 6)
-    residual: float
-    values: Array  # (3,) gamma, M, U
-    spread: Array  # (3, 6) error of values = spread . correction of the table's columns
-    bend: Array  # (LEVELS, 3) d rates/ds; zero where the state did not have to be sought
-    fixed: bool  # whether the place on the path means something
-    sought: bool = True  # whether it is a place of the extrapolated curve; else of N edges
-
-
-class _Goal(NamedTuple):
-    """What is sought on the extrapolated curve."""
-
-    column: int  # of the table
-    value: float
-    direction: float  # where gamma is sought: sign of dgamma/ds on this side of a fold
-
-
-def _goal(visit: Visit, asked: Collection[float]) -> _Goal | None:
-    """What a visited state stands for; None: for nothing but a place on the curve."""
-    load = visit.at.state.load
-    if visit.kind == "fold":
-        return _Goal(RATE + GAMMA, 0.0, 0.0)
-    if visit.kind == "limit":
-        return _Goal(RATE + MOMENT, 0.0, 0.0)
-    if visit.kind == "" and load in asked:
-        return _Goal(GAMMA, load, visit.at.tangent.load)
-    return None
-
-
-def _placed(family: _Family, visit: Visit, asked: Collection[float]) -> _Place | None:
-    """Where a visited state belongs on the extrapolated curve; None where a level has no state."""
-    here = family.matched(visit.at)
-    goal = _goal(visit, asked)
-    if here is None:
-        return None
-    if goal is not None:
-        return _sought(family, visit.at, here, goal)
-    values, bend = romberg(here.table)[-1][:RATE], np.zeros((LEVELS, RATE))
-    marked = visit.kind != ""
-    return _Place(0.0, here.table, here.residual, values, np.eye(RATE, 6), bend, marked, not marked)
-
-
-def _sought(family: _Family, base: Equilibrium, here: _Matched, goal: _Goal) -> _Place | None:
-    """Where the goal is, by the secant method from ``base``, to which ``here`` is matched."""
-    s, now, bend = 0.0, romberg(here.table)[-1], np.zeros((LEVELS, RATE))
-    slope = float(now[RATE + goal.column]) if goal.column < RATE else 0.0
-    for _ in range(_MOST):
-        step = (goal.value - float(now[goal.column])) / slope if slope else _PROBE
-        if slope and abs(step) <= _SMALL:
-            return _found(goal, s + step, _advanced(here, step, bend), slope, bend)
-        s += step
-        new = family.near(base, s) if abs(s) < _FARTHEST else None
-        if new is None:
-            return None
-        bend = (new.table[:, RATE:] - here.table[:, RATE:]) / step
-        after = romberg(new.table)[-1]
-        slope = float(after[goal.column] - now[goal.column]) / step
-        here, now = new, after
-    return None
-
-
-def _advanced(here: _Matched, step: float, bend: Array) -> _Matched:
-    """Matched states one small ``step`` further, where the rates change by ``bend`` per s."""
-    table = here.table.copy()
-    table[:, :RATE] += step * table[:, RATE:]
-    table[:, RATE:] += step * bend
-    return here._replace(table=table)
-
-
-def _found(goal: _Goal, s: float, here: _Matched, slope: float, bend: Array) -> _Place | None:
-    """The place of a goal; None for a gamma that lies beyond a fold of the extrapolated curve.
-
-    ``slope`` is the rate of what is sought along s.
-    """
-    line, spread = romberg(here.table)[-1], np.eye(RATE, 6)
-    if goal.column == GAMMA:
-        slope = float(line[RATE])
-        if slope * goal.direction <= 0.0:
-            return None
-        line[GAMMA] = goal.value
-    spread[:, goal.column] -= line[RATE:] / slope
-    if goal.column == GAMMA:
-        spread[GAMMA] = 0.0  # given, to the last digit
-    return _Place(s, here.table, here.residual, line[:RATE], spread, bend, fixed=True)
-
-
 def _arc_lengths(piece: Sector, visits: Sequence[Visit]) -> Array:
     """Distances (n,) of the visits from the first, along chords, in the norm of the path."""
     mass, lengths = piece.body.mass, [0.0] * bool(visits)
@@ -329,7 +119,7 @@ def _arc_lengths(piece: Sector, visits: Sequence[Visit]) -> Array:
     return np.cumsum(lengths)
 
 
-def _order(lengths: Array, places: Sequence[_Place | None]) -> list[int]:
+def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
     """Positions of the visits in their order on the extrapolated curve, without overtaken ones."""
     at = [s + (0.0 if p is None else p.s) for s, p in zip(lengths, places, strict=True)]
     fixed = [p is not None and p.fixed for p in places]
@@ -345,7 +135,7 @@ def _order(lengths: Array, places: Sequence[_Place | None]) -> list[int]:
     return sorted(kept, key=lambda k: at[k])
 
 
-def _scales(family: _Family, visits: Sequence[Visit]) -> Array:
+def _scales(family: Family, visits: Sequence[Visit]) -> Array:
     """What the columns of a table are measured in (6,): pi and the largest |M| and |U|."""
     values = np.array([family.values(0, visit.at) for visit in visits]).reshape(-1, RATE)
     largest = np.abs(values).max(axis=0, initial=0.0)
@@ -357,7 +147,7 @@ def _scales(family: _Family, visits: Sequence[Visit]) -> Array:
 class _Corrections:
     """What the two extrapolations change at the states of a path."""
 
-    places: Sequence[_Place | None]
+    places: Sequence[Place | None]
     first: Array  # (n, 6) T10 - T00; zero where there is no state
     last: Array  # (n, 6) T20 - T10
     exact: NDArray[np.bool_]  # (n,) the same on every mesh; or no state
@@ -365,7 +155,7 @@ class _Corrections:
     scales: Array  # (6,)
 
     @classmethod
-    def of(cls, places: Sequence[_Place | None], scales: Array) -> _Corrections:
+    def of(cls, places: Sequence[Place | None], scales: Array) -> _Corrections:
         """Corrections at these places."""
         none = np.zeros((LEVELS, 6))
         changes = np.array(
@@ -405,7 +195,7 @@ class _Corrections:
 
 
 def _slope_at_pi(
-    places: Sequence[_Place | None], visits: Sequence[Visit], corrections: _Corrections
+    places: Sequence[Place | None], visits: Sequence[Visit], corrections: _Corrections
 ) -> tuple[float | None, float | None]:
     """dM/dgamma at the first arrival at pi, and its error."""
     found = [k for k, v in enumerate(visits) if v.kind == "" and v.at.state.load == math.pi]

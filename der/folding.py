@@ -3,71 +3,54 @@
 from __future__ import annotations
 
 import math
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from types import FrameType
 
 import numpy as np
 
 from der.assembly import assemble
 from der.checks import counts
-from der.control import follow_angle, follow_moment, follow_relaxed
+from der.control import follow_angle, follow_moment
 from der.error_bars import error_bars
+from der.frames import Array
 from der.path import follow
-from der.record import AtPi, Path, Point, Shapes, Timing, folding_mode
+from der.record import AtPi, Path, Point, Timing, folding_mode
 from der.relaxation import relax
+from der.relaxed_march import follow_relaxed
 from der.ring import circle
 from der.rod import State
 from der.scene import Scene, meshes
 from der.sections import section
 from der.sector import Sector, free_ring, sector
+from der.shapes import Shapes
+from der.sites import sites
 from der.special import EIGHTH, Indices, Visit, Wanted, three_covered
 from der.stability import all_modes, index
 from der.step import Stuck, Tally
+from der.unfinished import Interrupted, NotConverged, interrupts_between_states
+from der.unfolding import shapes
 
 _NO_MOMENT = 1e-6  # of the largest |M|: a state of rest
+_KEPT = 64  # configurations of a snap for N gradients; it takes about 5 N
 _BALANCED = 1e-6  # residual, of the largest bending moment, of a free ring at rest
 
 
-class NotConverged(RuntimeError):
-    """A path that could not be followed to its end.
-
-    Attributes
-    ----------
-    path : what was found, up to and with the last good state.
-    """
-
-    def __init__(self, message: str, path: Path) -> None:
-        super().__init__(message)
-        self.path = path
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C in the middle of a path.
-
-    Attributes
-    ----------
-    path : what was found, up to and with the last good state.
-    """
-
-    def __init__(self, path: Path) -> None:
-        super().__init__("interrupted")
-        self.path = path
-
-
-def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> Path:
+def fold(
+    scene: Scene,
+    *,
+    progress: Callable[[float], object] | None = None,
+    watch: Callable[[Array], object] | None = None,
+) -> Path:
     """The path of equilibria of a ring from flat (gamma = 0) on, with what is special on it.
 
     Parameters
     ----------
     scene : the ring, its section and what is wanted.
     progress : called with gamma [rad] after every state.
+    watch : called with the vertices (N, 3) of the ring after every state.
 
     Returns
     -------
@@ -76,15 +59,11 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
 
     Raises
     ------
-    ValueError
-        For a ring that this solver cannot do yet.
     NotConverged
         Where the path cannot be followed to its end; has the path so far.
     Interrupted
         At Ctrl-C; has the path so far.
     """
-    if scene.ring.shape != "circle":
-        raise ValueError(f"ring must be a circle (der.circle), got a {scene.ring.shape}")
     piece = _piece(scene, scene.n_edges, scene.sector)
     until_folded = scene.until == "folded"
     beyond = scene.gamma_max > math.pi
@@ -105,13 +84,15 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
         return _record(scene, piece, visits, timing, status, message)
 
     try:
-        with _interrupts_between_states() as pressed:
+        with interrupts_between_states() as pressed:
             _load_kernels(wanted.stability, wanted.contacts, snaps=scene.control != "arclength")
             started = time.perf_counter()
             for visit in _march(scene, piece, wanted, tally):
                 visits.append(visit)
                 if progress is not None:
                     progress(visit.at.state.load)
+                if watch is not None:
+                    watch(piece.shape(visit.at.state)[0])
                 if pressed:
                     raise KeyboardInterrupt
     except Stuck as stuck:
@@ -121,31 +102,6 @@ def fold(scene: Scene, *, progress: Callable[[float], object] | None = None) -> 
     if scene.error_bars:
         return _with_error_bars(scene, piece, visits, record)
     return record("done")
-
-
-@contextmanager
-def _interrupts_between_states() -> Iterator[list[int]]:
-    """Take down Ctrl-C in a list, instead of raising; a second one raises at once.
-
-    Numba's wrappers do not look for exceptions while they hand results over, so that one raised
-    there would end the process, and all that was computed with it.
-    """
-    pressed: list[int] = []
-
-    def take_down(number: int, frame: FrameType | None) -> None:
-        if pressed:
-            signal.default_int_handler(number, frame)
-        pressed.append(number)
-
-    usual = threading.current_thread() is threading.main_thread()
-    if not usual or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield pressed
-        return
-    signal.signal(signal.SIGINT, take_down)
-    try:
-        yield pressed
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _piece(scene: Scene, n_edges: int, name: str) -> Sector:
@@ -202,14 +158,15 @@ def _with_error_bars(
 
 def _march(scene: Scene, piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
     """The states of the path, in the way in which the scene is controlled and solved."""
+    every = math.ceil(scene.n_edges / _KEPT) if scene.history else 0
     if scene.solver == "relaxation":
         # no Hessian anywhere: neither index nor link is looked for between states
         bare = replace(wanted, stability=False, contacts=False)
-        return follow_relaxed(piece, bare, tally, unload=scene.unload)
+        return follow_relaxed(piece, bare, tally, unload=scene.unload, every=every)
     if scene.control == "angle":
-        return follow_angle(piece, wanted, tally, unload=scene.unload)
+        return follow_angle(piece, wanted, tally, unload=scene.unload, every=every)
     if scene.control == "moment":
-        return follow_moment(piece, wanted, tally)
+        return follow_moment(piece, wanted, tally, every=every)
     return follow(piece, wanted, tally)
 
 
@@ -273,7 +230,7 @@ def _record(
         error=None,
         timing=timing,
         # an unfinished path keeps its shapes in any case: they are what it got to
-        shapes=_shapes(piece, visits) if visits and (scene.shapes or status != "done") else None,
+        shapes=_shapes(scene, piece, visits, status) if scene.shapes or status != "done" else None,
         status=status,
         message=message,
     )
@@ -331,10 +288,13 @@ def _free_index(scene: Scene, piece: Sector, visit: Visit) -> int | None:
     return index(whole.body, held, all_modes(held), state.but(force=force))
 
 
-def _shapes(piece: Sector, visits: list[Visit]) -> Shapes:
-    """Vertices and frames of the full ring at every state."""
-    shapes = [piece.shape(visit.at.state) for visit in visits]
-    return Shapes(np.array([x for x, _ in shapes]), np.array([frames for _, frames in shapes]))
+def _shapes(scene: Scene, piece: Sector, visits: list[Visit], status: str) -> Shapes | None:
+    """The full ring at every state, if there is any, and what else was asked to be kept of it."""
+    if not visits:
+        return None
+    modes = scene.modes and status != "interrupted"  # who pressed Ctrl-C does not wait for them
+    arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
+    return shapes(piece, visits, arc_length, history=scene.history, modes=modes)
 
 
 def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:

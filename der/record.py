@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -20,6 +19,7 @@ import numpy as np
 from der import checks
 from der.checks import Array, Counts, optional
 from der.files import FilePath, write_whole
+from der.shapes import Shapes
 
 SCHEMA = 1
 SOLVERS = ("der", "bvp")
@@ -103,62 +103,6 @@ class Timing:
     def __post_init__(self) -> None:
         _check(self, checks.checked_number, "solve_s")
         _check(self, checks.count, "newton_iterations", "steps")
-
-
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """The full ring at every state of a path.
-
-    Parameters
-    ----------
-    x : (n, N, 3) array
-        Vertex positions, a.
-    frames : (n, N, 3, 3) array
-        Material frames, per edge; rows d1, d2, d3.
-
-    Raises
-    ------
-    ValueError
-        If a shape is another or a value is not finite.
-    """
-
-    x: Array
-    frames: Array
-
-    def __post_init__(self) -> None:
-        x = checks.checked_array("x", self.x, ("n", "N", 3))
-        frames = checks.checked_array("frames", self.frames, (*x.shape, 3))
-        for name, array in (("x", x), ("frames", frames)):
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-
-    def save(self, path: FilePath) -> None:
-        """Write npz, whole or not at all.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written; one already there is then unharmed.
-        """
-        write_whole(path, lambda file: np.savez(file, x=self.x, frames=self.frames))
-
-    @classmethod
-    def load(cls, path: FilePath) -> Shapes:
-        """Shapes of an npz file.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be read.
-        ValueError
-            If it is broken or not such a file.
-        """
-        with open(path, "rb") as file:
-            try:
-                with np.load(file, allow_pickle=False) as arrays:
-                    return cls(x=arrays["x"], frames=arrays["frames"])
-            except (ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as problem:
-                raise ValueError(f"{os.fspath(path)}: no shapes in it: {problem}") from problem
 
 
 @dataclass(frozen=True, eq=False)

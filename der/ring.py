@@ -141,7 +141,7 @@ def ring_from_json(record: Mapping[str, Any]) -> Ring:
         "circle": (circle, {"natural_curvature"}),
         "ellipse": (ellipse, {"b_over_a", "twist_axis"}),
         "rectangle": (rectangle, {"b_over_a", "r_over_a", "twist_axis"}),
-        "triangle": (_triangle_in_degrees, {"vertex_angle", "r_over_a"}),
+        "triangle": (triangle_in_degrees, {"vertex_angle", "r_over_a"}),
         "profile": (profile, {"arc_length", "curvature"}),
     }
     entries = dict(record)
@@ -303,10 +303,11 @@ def triangle(vertex_angle: float, r_over_a: float) -> Ring:
     vertex_angle = checked_number(
         "vertex_angle", vertex_angle, "an angle in (0, pi) rad", lambda number: 0 < number < np.pi
     )
-    return _triangle_in_degrees(math.degrees(vertex_angle), r_over_a)
+    return triangle_in_degrees(math.degrees(vertex_angle), r_over_a)
 
 
-def _triangle_in_degrees(vertex_angle: float, r_over_a: float) -> Ring:
+def triangle_in_degrees(vertex_angle: float, r_over_a: float) -> Ring:
+    """Return the `triangle` whose angle is given in degrees, as in records and on command lines."""
     # The geometry follows the number in the record, so that a ring read back is the ring written;
     # rounding makes it 60 where degrees(pi/3) is not.
     degrees = round(

@@ -40,6 +40,8 @@ class Scene:
         the path then holds extrapolated values with their errors. From 32 edges on, divisible by
         16 on a quarter and by 8 otherwise.
     shapes : whether to keep vertices and frames of every state.
+    history : with shapes, whether to keep how the ring falls in each snap, too.
+    modes : with shapes, whether to compute the softest mode of each symmetry at every state.
     control : "arclength" follows the path of equilibria through its folds; "angle" turns the grips
         and "moment" raises a dead moment: the state is then a minimum, and where it ceases to be
         one the ring snaps.
@@ -69,6 +71,8 @@ class Scene:
     contacts: bool | None = None
     error_bars: bool = False
     shapes: bool = False
+    history: bool = False
+    modes: bool = False
     control: str = "arclength"
     unload: bool = False
     solver: str = "newton"
@@ -90,10 +94,13 @@ class Scene:
             )
         object.__setattr__(self, "n_edges", _whole("n_edges", self.n_edges))
         sector_name(self.ring, self.sector, self.n_edges)
-        for name in ("stability", "error_bars", "shapes", "unload"):
+        for name in ("stability", "error_bars", "shapes", "history", "modes", "unload"):
             object.__setattr__(self, name, truth(name, getattr(self, name)))
         if self.error_bars:
             meshes(self.n_edges, sector_name(self.ring, self.sector, self.n_edges))
+        for name in ("history", "modes"):
+            if getattr(self, name) and not self.shapes:
+                raise ValueError(f"{name} must come with shapes, got shapes=False")
         if self.contacts is not None:
             object.__setattr__(self, "contacts", truth("contacts", self.contacts))
         self._check_control()
@@ -125,6 +132,8 @@ class Scene:
                 raise ValueError(
                     f"solver 'relaxation' must come with control 'angle', got {self.control!r}"
                 )
+        if self.solver == "relaxation" and self.modes:
+            raise ValueError("modes must come with solver 'newton', got 'relaxation'")
         if self.control != "arclength":
             if self.until is not None:
                 raise ValueError(f"until must come with control 'arclength', got {self.control!r}")

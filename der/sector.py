@@ -7,8 +7,8 @@ and its length, and slides along E3. Half-turns that map a twisted ring onto its
     about E3   swaps the arms,   s -> L - s           (all rings)
     about E2   swaps the grips,  s -> L/2 - s         (D2: circle, ellipse, rectangle)
 
-so that the ring is made of 2 halves (grip to grip) or 4 quarters (free point to grip). Grips and
-free points always sit on middles of edges, at every resolution.
+so that the ring is made of 2 halves (grip to grip) or 4 quarters (free point to grip). Grips, free
+points and jumps of curvature hold a frame at every resolution (`sites`).
 
 The clamped grips join the arms through the grip distance alone. Hence the modes of the full ring:
 
@@ -30,6 +30,7 @@ from der.ring import Ring
 from der.rod import Rod, State, rod
 from der.scene import COPIES, sector_name
 from der.sections import Section
+from der.sites import sites
 from der.stability import SymmetryClass
 from der.supports import Supports, supports
 
@@ -100,15 +101,9 @@ def sector(
         Where ``n_edges`` does not divide, or the ring lacks the symmetry.
     """
     name = sector_name(ring, name, n_edges)
-    step = ring.length / n_edges
-    first, last = {
-        "full": (0, n_edges - 1),
-        "half": (0, n_edges // 2),
-        "quarter": (n_edges // 4, n_edges // 2),
-    }[name]
-    s: Array = step * np.arange(first, last + 1, dtype=float)
+    joints = sites(ring, n_edges, name)
     closed = name == "full"
-    joints = np.append(s, ring.length) if closed else s
+    s = joints[:-1] if closed else joints
     body = rod(
         np.diff(joints),
         np.diff(ring.natural_angle(joints)),

@@ -94,6 +94,7 @@ class _Drop:
             tolerance=tolerance,
             every=self.every,
         )
+        self.tally.force_evaluations += fall.evaluations
         if fall.rests or fall.outcome is Rest.AT_STOP:
             return fall
         where = f"vertex {fall.where} " if fall.where >= 0 else ""

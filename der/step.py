@@ -38,6 +38,7 @@ class Tally:
 
     newton_iterations: int = 0
     steps: int = 0
+    force_evaluations: int = 0  # of dynamic relaxation
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,8 @@ def headline(path: Path) -> str:
         if isinstance(value, int | float)
     )
     ring = f"{path.ring['shape']} ({parameters})" if parameters else f"{path.ring['shape']}"
+    if path.ring.get("twist_axis") == "y":
+        ring += " about y"
     section = f"alpha {path.section['alpha']:.6g}, beta {path.section['beta']:.6g}"
     if path.section.get("h_over_t") is not None:
         nu = path.section.get("nu")

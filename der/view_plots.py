@@ -7,8 +7,6 @@ changes and no display is needed.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path as File
 from typing import Any, TypeAlias
 
@@ -22,15 +20,16 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from der.curve import SNAP, sides, smooth, stretches
 from der.files import FilePath, write_whole
-from der.record import Mode, Path, Shapes
+from der.record import Mode, Path
+from der.shapes import Shapes
 
 Array: TypeAlias = NDArray[np.float64]
 
 FORMATS = (".png", ".pdf", ".svg")
 SIZE, DPI = (8.0, 6.0), 150  # inches; 1200 x 900 px
 INK, QUIET = "#222222", "#8a8a8a"
-SNAP = "snap"  # a stretch between two equilibria that no equilibria join
 # line style of a stretch by whether it is stable; blue and vermilion of Okabe and Ito
 STRETCHES: dict[bool | str | None, tuple[str, str, Any]] = {
     True: ("stable ($\\gamma$ held)", "#0072B2", "-"),
@@ -176,7 +175,7 @@ def _legend_handles(path: Path) -> list[Line2D]:
     """One entry for every kind of line and of mark that occurs."""
     handles = []
     for stability, (label, colour, style) in STRETCHES.items():
-        if stability in _stability(path):
+        if stability in sides(path):
             handles.append(Line2D([], [], color=colour, linestyle=style, label=label))
     kinds = {point.kind for point in path.points}
     for kind, (label, marker, size) in MARKS.items():
@@ -201,7 +200,7 @@ def _mark(marker: str, size: float) -> dict[str, Any]:
 
 def _draw_curve(panel: Axes, path: Path, height: Array, label: str) -> None:
     """Draw stable and unstable stretches, the states on them, and the special points."""
-    for stable, points in _stretches(path, height):
+    for stable, points in stretches(path, height):
         _, colour, style = STRETCHES[stable]
         panel.plot(*points.T, color=colour, linestyle=style, linewidth=1.5, zorder=2)
     panel.plot(path.gamma / math.pi, height, zorder=3, **STATE)
@@ -216,98 +215,11 @@ def _draw_curve(panel: Axes, path: Path, height: Array, label: str) -> None:
     panel.yaxis.set_label_coords(-0.062, 0.5)
 
 
-def _stability(path: Path) -> list[bool | str | None]:
-    """Whether each interval between neighbouring states is stable; None where nothing is known.
-
-    An interval that the ring snaps over is SNAP.
-
-    A state of unknown index, as special points are, leaves the intervals beside it to its
-    neighbours: the style changes there.
-    """
-    known: list[bool | str | None] = [None if i is None else i == 0 for i in path.index.tolist()]
-    if len(known) == 1:
-        return known
-    found = [a if a is not None else b for a, b in pairwise(known)]
-    for way in (range(1, len(found)), range(len(found) - 2, -1, -1)):
-        for k in way:
-            if found[k] is None:
-                found[k] = found[k - 1 if way.step > 0 else k + 1]
-    for k in _snaps(path):
-        found[k - 1] = SNAP
-    return found
-
-
-def _snaps(path: Path) -> list[int]:
-    """Positions of the states in which snaps have landed."""
-    return [point.position for point in path.points if point.kind == "snap" and point.position]
-
-
-def _pieces(path: Path) -> list[tuple[int, int]]:
-    """First and last states of the smooth pieces: cut at snaps, and where gamma is turned back."""
-    landed = _snaps(path)
-    way = np.diff(np.column_stack([path.gamma, path.moment]), axis=0)
-    turned = [
-        k
-        for k in range(1, len(path) - 1)
-        if np.dot(way[k - 1], way[k]) < -0.9 * np.linalg.norm(way[k - 1]) * np.linalg.norm(way[k])
-    ]
-    starts = sorted({0, *landed, *turned})
-    lasts = [k - 1 if k in landed else k for k in starts[1:]] + [len(path) - 1]
-    return list(zip(starts, lasts, strict=True))
-
-
-def _stretches(path: Path, height: Array) -> Iterator[tuple[bool | str | None, Array]]:
-    """Yield the smooth curve (gamma/pi, height) in stretches of one stability."""
-    if len(path) == 1:
-        return
-    stability = _stability(path)
-    curve = _smooth(path, height)
-    ends = [k for k in range(1, len(stability)) if stability[k] != stability[k - 1]]
-    per = (len(curve) - 1) // len(stability)
-    for first, last in zip([0, *ends], [*ends, len(stability)], strict=True):
-        yield stability[first], curve[first * per : last * per + 1]
-
-
-def _smooth(path: Path, height: Array, per: int = 16) -> Array:
-    """Return `per` points an interval on a smooth curve (gamma/pi, height) through all states.
-
-    The natural cubic spline of the chord length along (gamma, M), which turns with the path through
-    folds; on circles it is within 0.3% of the panel of the true path, monotone cubics within 0.4%.
-    """
-    values = np.column_stack([path.gamma / math.pi, height])
-    place = np.arange(per * (len(path) - 1) + 1) / per
-    curve = np.column_stack([np.interp(place, np.arange(len(path)), v) for v in values.T])
-    chord = _chord(path)
-    for first, last in _pieces(path):
-        piece = slice(first, last + 1)
-        inside = slice(first * per, last * per + 1)
-        curve[inside] = _spline(chord[piece], values[piece], place[inside] - first)
-    return curve
-
-
-def _spline(chord: Array, values: Array, place: Array) -> Array:
-    """Natural cubic spline of one piece, at places counted in states."""
-    from scipy.interpolate import CubicSpline
-
-    is_new = np.append(True, np.diff(chord) > 1e-5)  # neighbours in the same place make no slope
-    if np.count_nonzero(is_new) == 1:
-        return np.repeat(values[:1], len(place), axis=0)
-    at = np.interp(place, np.arange(len(chord)), chord)
-    curve: Array = CubicSpline(chord[is_new], values[is_new], bc_type="natural")(at)
-    return curve
-
-
-def _chord(path: Path) -> Array:
-    """Return the chord length along (gamma, M), each over its range, up to every state."""
-    step = [np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (path.gamma, path.moment)]
-    return np.append(0.0, np.cumsum(np.hypot(*step)))
-
-
 def _letter(panel: Axes, path: Path, height: Array, chosen: list[int]) -> None:
     """Write each snapshot's letter beside its state, where there is most room."""
     panel.autoscale_view()
     to_pixels = panel.transData.transform
-    obstacles = to_pixels(_smooth(path, height))
+    obstacles = to_pixels(smooth(path, height))
     low, high = panel.get_window_extent().get_points()
     turn = np.arange(16) * math.pi / 8
     offsets = 9.5 * np.column_stack([np.cos(turn), np.sin(turn)])  # points

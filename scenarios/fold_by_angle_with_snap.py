@@ -20,6 +20,8 @@ scene = der.Scene(
     control="angle",
     unload=True,
     shapes=True,
+    history=True,
+    modes=True,
 )
 path = der.fold(scene)
 

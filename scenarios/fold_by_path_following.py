@@ -13,7 +13,9 @@ from __future__ import annotations
 import der
 from scenarios.output import write
 
-scene = der.Scene(der.circle(), der.rectangular_section(h_over_t=1.6), n_edges=128, shapes=True)
+scene = der.Scene(
+    der.circle(), der.rectangular_section(h_over_t=1.6), n_edges=128, shapes=True, modes=True
+)
 path = der.fold(scene)
 
 first_fold, second_fold = path.folds

@@ -13,7 +13,10 @@ from validation import bench
 @pytest.fixture
 def tiny(monkeypatch):
     """The smallest sizes, each measured once."""
-    for name, size in (("_paths", 1), ("_needs", 1), ("_errors", (16, 32)), ("_newton", (16,))):
+    sizes = {"_relaxation": (16,), "_errors": (16, 32), "_newton": (16,)}
+    for name, size in (
+        dict.fromkeys(("_paths", "_needs", "_snaps", "_recording"), 1) | sizes
+    ).items():
         whole = getattr(bench, name)
         monkeypatch.setattr(bench, name, lambda _, whole=whole, size=size: whole(size))
     monkeypatch.setattr(bench, "_start_up", lambda _: iter(()))
@@ -23,7 +26,8 @@ def tiny(monkeypatch):
 def test_measure_yields_rows_of_every_group():
     """Finite numbers, with all that the project sets itself goals for among them."""
     rows = list(bench.measure(quick=True))
-    groups = {"path", "need", "curve error", "order", "newton", "memory"}
+    groups = {"path", "need", "relaxation", "snap", "recording", "curve error", "order", "newton"}
+    groups |= {"memory"}
     assert groups <= {row.group for row in rows}
     assert all(math.isfinite(row.value) for row in rows)
 

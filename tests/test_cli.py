@@ -18,7 +18,8 @@ import der
 import der.folding
 import der.path
 from der.cli import main
-from der.record import Path, Shapes
+from der.record import Path
+from der.shapes import Shapes
 
 EIGHTH = math.pi / 8
 SMALL = ("fold", "circle", "--h-over-t", "4", "--edges", "16")
@@ -51,6 +52,11 @@ def run(capsys):
         return left.value.code, out, err.splitlines()
 
     return command
+
+
+def shape(*words):
+    """A fold of this shape."""
+    return ("fold", *words, "--h-over-t", "4")
 
 
 def shell(*words, **options):
@@ -143,7 +149,46 @@ WRONG = [
     (line("--plot", "no/such/p.png"), "--plot", "'no/such/p.png'", "folder"),
     (("fold", "square"), "SHAPE", "'square'", "circle"),
     (("fold",), "SHAPE", "Missing", "argument"),
-    (line("circle"), "argument", "(circle)", "unexpected"),
+    (line("circle"), "FILE", "'circle'", "profile"),
+    (line("circle", "circle"), "argument", "(circle)", "unexpected"),
+    (("fold", "ellipse", "--h-over-t", "4"), "--b-over-a", "none", "SHAPE ellipse"),
+    (line("--b-over-a", "0.5"), "--b-over-a", "0.5", "SHAPE ellipse or rectangle"),
+    (shape("ellipse", "--b-over-a", "1.2"), "--b-over-a", "1.2", "in (0, 1]"),
+    (shape("ellipse", "--b-over-a", "0.5", "--axis", "z"), "--axis", "'z'", "x or y"),
+    (shape("rectangle", "--b-over-a", "0.5", "--r-over-a", "0.6"), "--r-over-a", "0.6", "0.5]"),
+    (
+        shape("triangle", "--vertex-angle", "180", "--r-over-a", "0.1"),
+        "--vertex-angle",
+        "180",
+        "180) d",
+    ),
+    (
+        shape("triangle", "--vertex-angle", "0", "--r-over-a", "0.1"),
+        "--vertex-angle",
+        "0",
+        "(0, 180)",
+    ),
+    (
+        shape("triangle", "--vertex-angle", "60", "--r-over-a", "0.3"),
+        "--r-over-a",
+        "0.3",
+        "0.288675",
+    ),
+    (
+        shape("triangle", "--vertex-angle", "60", "--r-over-a", "0.1", "--axis", "y"),
+        "--axis",
+        "'y'",
+        "x for",
+    ),
+    (shape("triangle", "--r-over-a", "0.1"), "--vertex-angle", "none", "given"),
+    (shape("profile"), "FILE", "None", "profile"),
+    (shape("profile", "no.csv"), "--file", "'no.csv'", "readable"),
+    (("bvp", *line()[1:], "--tolerance", "1"), "--tolerance", "1.0", "1e-11 to 0.001"),
+    (("bvp", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
+    (("bvp", *line()[1:], "--sector", "full"), "--sector", "'full'", "half or quarter"),
+    (("bvp", *line()[1:], "--stretch", "finite"), "--stretch", "'finite'", "'inextensible'"),
+    (("compare", *line()[1:], "--edges", "24"), "--edges", "24", "divisible by 16"),
+    (("figure", "fig99", "--out", "."), "--name", "'fig99'", "fig2b"),
     (line("--egdes", "16"), "--egdes", "No such option", "--edges"),
     (("fold", "circle", "--h-over-t"), "--h-over-t", "requires", "argument"),
     (("bend",), "'bend'", "No such command", ""),

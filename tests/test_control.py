@@ -9,8 +9,9 @@ import pytest
 from rods import solved
 
 import der
-from der.control import RESOLUTION, follow_angle, follow_moment, follow_relaxed
+from der.control import follow_angle, follow_moment
 from der.path import follow
+from der.relaxed_march import RESOLUTION, follow_relaxed
 from der.sector import Sector, sector
 from der.snap import Landing
 from der.special import Visit, Wanted

@@ -9,16 +9,8 @@ import pytest
 
 import der
 import der.record
-from der.error_bars import (
-    GAMMA,
-    ErrorBars,
-    _Family,
-    _found,
-    _Goal,
-    _Matched,
-    error_bars,
-    romberg,
-)
+from der.error_bars import ErrorBars, error_bars
+from der.matching import GAMMA, Family, Goal, Matched, _found, romberg
 from der.path import follow
 from der.scene import meshes
 from der.sector import Sector, sector
@@ -87,7 +79,7 @@ def test_rates_are_derivatives_along_the_path(place):
     Differences of 1e-4 err by their square, 1e-8 times third derivatives of up to 100.
     """
     pieces, visits, _ = solved(4.0, 64)
-    family, base = _Family(tuple(pieces), 1e-12), visits[place].at
+    family, base = Family(tuple(pieces), 1e-12), visits[place].at
     here, behind, ahead = family.matched(base), family.near(base, -1e-4), family.near(base, 1e-4)
     differences = (ahead.table[0, :3] - behind.table[0, :3]) / 2e-4
     assert here.table[0, 3:] == pytest.approx(differences, abs=1e-6)
@@ -220,9 +212,9 @@ def test_gamma_is_not_sought_round_a_fold():
     By hand: three equal meshes with dgamma/ds = 1.
     """
     table = np.tile([0.0, 0.0, 0.0, 1.0, 1.0, 0.0], (3, 1))
-    here, bend = _Matched(table, 0.0), np.zeros((3, 3))
-    assert _found(_Goal(GAMMA, 0.0, direction=1.0), 0.0, here, 1.0, bend) is not None
-    assert _found(_Goal(GAMMA, 0.0, direction=-1.0), 0.0, here, 1.0, bend) is None
+    here, bend = Matched(table, 0.0), np.zeros((3, 3))
+    assert _found(Goal(GAMMA, 0.0, direction=1.0), 0.0, here, 1.0, bend) is not None
+    assert _found(Goal(GAMMA, 0.0, direction=-1.0), 0.0, here, 1.0, bend) is None
 
 
 def test_contact_points_have_no_errors():

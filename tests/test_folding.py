@@ -31,14 +31,12 @@ def at(path, gamma, name):
 # --- What is refused, and what is told -------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "ring", [der.ellipse(0.8), der.rectangle(0.8, 0.1), der.triangle(1.0, 0.1)], ids=str
-)
-def test_other_shapes_are_refused_so_far(ring):
-    """By name, before anything is computed."""
-    scene = der.Scene(ring, der.rectangular_section(4.0))
-    with pytest.raises(ValueError, match=f"^ring must be a circle .*, got a {ring.shape}$"):
-        der.fold(scene)
+def test_every_state_can_be_watched():
+    """The vertices that the path keeps, in their order."""
+    seen = []
+    scene = der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=32, shapes=True)
+    path = der.fold(scene, watch=seen.append)
+    np.testing.assert_array_equal(seen, path.shapes.x)
 
 
 def test_progress_is_told_of_every_state():
@@ -132,6 +130,17 @@ def test_ctrl_c_hands_over_what_there_is():
     part = caught.value.path
     assert part.status == "interrupted"
     assert part.gamma.tolist() == folded().gamma[:5].tolist()
+
+
+def test_ctrl_c_does_not_wait_for_modes():
+    """They take longer than the path itself; its shapes are there."""
+    section = der.rectangular_section(4.0)
+    scene = der.Scene(der.circle(), section, n_edges=32, shapes=True, modes=True)
+    with pytest.raises(der.Interrupted) as caught:
+        der.fold(scene, progress=interrupt_after(3))
+    shapes = caught.value.path.shapes
+    assert len(shapes.x) == 3
+    assert shapes.softest is None
 
 
 def test_ctrl_c_is_a_keyboard_interrupt():

@@ -11,16 +11,8 @@ import threading
 import numpy as np
 import pytest
 
-from der.record import (
-    AtPi,
-    Mode,
-    Path,
-    Point,
-    Shapes,
-    Timing,
-    counts,
-    folding_mode,
-)
+from der.record import AtPi, Mode, Path, Point, Timing, counts, folding_mode
+from der.shapes import Shapes
 
 GAMMA = np.array([0.0, 0.1 + 0.2, 2.0, np.pi])
 
@@ -383,47 +375,6 @@ def test_threads_that_save_to_one_file_leave_one_whole_file(tmp_path):
 def shapes(n=4):
     rng = np.random.default_rng(1)
     return Shapes(x=rng.normal(size=(n, 5, 3)), frames=rng.normal(size=(n, 5, 3, 3)))
-
-
-@pytest.mark.parametrize("name", ["shapes.npz", "shapes"])
-def test_shapes_come_back_bit_for_bit(tmp_path, name):
-    """Under exactly the name given: numpy would add .npz to one without it."""
-    before = shapes()
-    before.save(tmp_path / name)
-    after = Shapes.load(tmp_path / name)
-    assert after.x.tobytes() == before.x.tobytes()
-    assert after.frames.tobytes() == before.frames.tobytes()
-    assert os.listdir(tmp_path) == [name]
-
-
-@pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04 cut short"])
-def test_broken_shapes_are_refused_by_name(tmp_path, content):
-    (tmp_path / "broken.npz").write_bytes(content)
-    with pytest.raises(ValueError, match=r"broken\.npz"):
-        Shapes.load(tmp_path / "broken.npz")
-
-
-def test_damaged_shapes_are_refused_by_name(tmp_path):
-    """One flipped byte in the numbers is seen by the checksum."""
-    file = tmp_path / "broken.npz"
-    shapes().save(file)
-    content = bytearray(file.read_bytes())
-    content[300] ^= 0xFF
-    file.write_bytes(content)
-    with pytest.raises(ValueError, match=r"broken\.npz"):
-        Shapes.load(file)
-
-
-def test_other_arrays_are_not_shapes(tmp_path):
-    np.savez(tmp_path / "other.npz", y=np.zeros(3))
-    with pytest.raises(ValueError, match=r"other\.npz"):
-        Shapes.load(tmp_path / "other.npz")
-
-
-@pytest.mark.parametrize(("x", "frames"), [((4, 5, 2), (4, 5, 3, 3)), ((4, 5, 3), (4, 6, 3, 3))])
-def test_shapes_of_another_shape_are_refused(x, frames):
-    with pytest.raises(ValueError, match="shape"):
-        Shapes(np.zeros(x), np.zeros(frames))
 
 
 def test_shapes_belong_to_every_state():

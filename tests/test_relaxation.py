@@ -7,7 +7,8 @@ from rods import E1, E3, MEASURES, solved, straight, unloaded
 import der
 from der.assembly import assemble
 from der.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
-from der.relaxation import Motion, Pull, Relaxed, Rest, gradient, no_pull, relax
+from der.forces import Motion, Pull, gradient, no_pull
+from der.relaxation import Relaxed, Rest, relax
 from der.rod import Rod, State
 from der.sector import Sector, sector
 from der.supports import Supports, supports

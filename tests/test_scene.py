@@ -27,6 +27,8 @@ def scene(**wants):
         ("stability", True),
         ("contacts", None),
         ("shapes", False),
+        ("history", False),
+        ("modes", False),
         ("gamma_max", math.pi),
         ("until", None),
         ("save_at", None),
@@ -192,11 +194,26 @@ def test_one_saved_gamma_is_a_list_of_one():
         scene(save_at=0.5)
 
 
-@pytest.mark.parametrize("name", ["stability", "contacts", "shapes"])
+@pytest.mark.parametrize("name", ["stability", "contacts", "shapes", "history", "modes"])
 def test_switches_are_true_or_false(name):
     """A text such as "no" is true in Python."""
     with pytest.raises(ValueError, match=rf"^{name} must be true or false, got 'no'"):
         scene(**{name: "no"})
+
+
+@pytest.mark.parametrize("name", ["history", "modes"])
+def test_what_goes_with_shapes_is_refused_without(name):
+    """It would be computed and thrown away."""
+    with pytest.raises(ValueError, match=f"^{name} must come with shapes, got shapes=False"):
+        scene(**{name: True})
+
+
+def test_modes_are_refused_where_there_is_no_hessian():
+    """As by dynamic relaxation alone."""
+    with pytest.raises(
+        ValueError, match=r"^modes must come with solver 'newton', got 'relaxation'"
+    ):
+        scene(control="angle", solver="relaxation", shapes=True, modes=True)
 
 
 # --- What is kept ----------------------------------------------------------------------------

@@ -34,7 +34,7 @@ def lines(**changes):
 
 def test_headline_has_ring_section_and_mesh():
     """Enough to know which run it was."""
-    expected = "ellipse (b/a 0.85), h/t 4, nu 0.3 (alpha 0.75, beta 12), 64 edges"
+    expected = "ellipse (b/a 0.85) about y, h/t 4, nu 0.3 (alpha 0.75, beta 12), 64 edges"
     assert lines()[0] == expected
 
 
@@ -51,7 +51,7 @@ def test_headline_has_ring_section_and_mesh():
 )
 def test_headline_says_what_is_known_of_the_section(section, words):
     """Not every section is a rectangle of known material."""
-    assert lines(section=section)[0] == f"ellipse (b/a 0.85), {words}, 64 edges"
+    assert lines(section=section)[0] == f"ellipse (b/a 0.85) about y, {words}, 64 edges"
 
 
 def test_headline_of_a_profile():

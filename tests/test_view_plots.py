@@ -9,7 +9,8 @@ import pytest
 from matplotlib.colors import to_hex
 from numpy.testing import assert_allclose
 
-from der.record import AtPi, Mode, Path, Point, Shapes, Timing, counts
+from der.record import AtPi, Mode, Path, Point, Timing, counts
+from der.shapes import Shapes
 from der.view_plots import STRETCHES, figure_of_path, save_plot
 
 STABLE, UNSTABLE, UNKNOWN = (STRETCHES[key][0] for key in (True, False, None))

@@ -13,8 +13,10 @@ from rerun.chunk import RrdReader
 
 import der
 from der import files, view_rerun
-from der.record import Shapes, Timing, counts
-from der.view_rerun import Motion, playback, recording_bytes, save_recording
+from der.film import playback
+from der.record import Timing, counts
+from der.shapes import Fall, Shapes, Softest
+from der.view_rerun import recording_bytes, save_recording
 
 EDGES = 32
 
@@ -77,16 +79,24 @@ class Recording:
         return {entity for entity, _ in self.columns}
 
 
-def written(tmp_path, path, **more):
-    save_recording(path, tmp_path / "some.rrd", **more)
+def written(tmp_path, path):
+    save_recording(path, tmp_path / "some.rrd")
     return Recording(tmp_path / "some.rrd")
 
 
-def a_motion(path, steps=5):
-    """The ring moves from the first fold to where gamma is the same on the last branch."""
+def falling(path, steps=5):
+    """The path with a fall: from the first fold to where gamma is the same on the last branch."""
     after = path.folds[0].position
     chosen = np.linspace(after, len(path) - 1, steps).astype(int)
-    return Motion(after, path.shapes.x[chosen], path.shapes.frames[chosen])
+    kept = (getattr(path, name)[chosen] for name in ("gamma", "energy"))
+    fall = Fall(after, *kept, path.shapes.x[chosen], path.shapes.frames[chosen])
+    return replace(path, shapes=replace(path.shapes, falls=(fall,)))
+
+
+def softened(path, classes, eigenvalues, u):
+    """The path with softest modes."""
+    softest = Softest(classes, eigenvalues, u)
+    return replace(path, shapes=replace(path.shapes, softest=softest))
 
 
 def same(one, other):
@@ -295,21 +305,21 @@ def test_parameters_are_in_the_text(read):
 # --- What may be given besides ---------------------------------------------------------------
 
 
-def test_motion_is_put_in_after_its_state(path, tmp_path):
-    """gamma rests, M is not known, U is that of the shapes; all states keep their order."""
-    motion = a_motion(path)
-    film = playback(path, motions=[motion])
-    new = slice(motion.after + 1, motion.after + 6)
+def test_fall_is_put_in_after_its_state(path, tmp_path):
+    """M is not known while the ring falls; all states keep their order."""
+    path = falling(path)
+    (fall,) = path.shapes.falls
+    film = playback(path)
+    new = slice(fall.after + 1, fall.after + 6)
     assert len(film.x) == len(path) + 5
-    assert_array_equal(film.x[new], motion.x)
-    assert_array_equal(film.gamma[new], path.gamma[motion.after])
+    assert_array_equal(film.x[new], fall.x)
+    assert_array_equal(film.gamma[new], fall.gamma)
+    assert_array_equal(film.energy[new], fall.energy)
     assert_array_equal(film.position[film.position >= 0], np.arange(len(path)))
-    assert film.energy[new][-1] == pytest.approx(path.energy[-1], abs=1e-10)
 
-    read = written(tmp_path, path, motions=[motion])
-    steps, moments = read.series("moment")
-    assert not set(steps) & set(range(new.start, new.stop))
-    assert_array_equal(moments, path.moment)
+    read = written(tmp_path, path)
+    _, moments = read.series("moment")  # a nan breaks the line
+    assert_array_equal(moments, np.insert(path.moment, fall.after + 1, [np.nan] * 5))
     assert read.rows("/curves/moment/now", "Points2D:positions")[new.start] == []
     assert len(read.rows("/curves/energy/now", "Points2D:positions")[new.start]) == 1
     assert read.rows("/states/stability", "StateChange:state")[new.start] == ["in motion"]
@@ -317,30 +327,51 @@ def test_motion_is_put_in_after_its_state(path, tmp_path):
     assert last == path.points[-1].position + 5
 
 
-def test_energy_of_a_motion_can_be_given(path):
-    motion = replace(a_motion(path), energy=np.arange(5.0))
-    film = playback(path, motions=[motion])
-    assert_array_equal(film.energy[motion.after + 1 : motion.after + 6], np.arange(5.0))
-
-
-def test_eigenvalues_are_series_where_they_are_known(path, tmp_path):
+def test_eigenvalues_are_series_named_after_their_symmetry(path, tmp_path):
+    """Bit for bit, one series each."""
     values = np.linspace(1, -1, 2 * len(path)).reshape(-1, 2)
-    values[3] = np.nan
-    steps, first = written(tmp_path, path, eigenvalues=values).series("eigenvalues/0")
-    assert 3 not in steps
-    assert_array_equal(first, np.delete(values[:, 0], 3))
+    path = softened(path, ("in phase", "odd"), values, path.shapes.x)
+    read = written(tmp_path, path)
+    assert_array_equal(read.series("eigenvalues/in_phase")[1], values[:, 0])
+    assert_array_equal(read.series("eigenvalues/odd")[1], values[:, 1])
 
 
-def test_softest_mode_is_a_ghost_where_it_is_known(path, tmp_path):
-    """Displaced by the mode, at most by a fifth of the ring's radius, at states that have one."""
-    modes = np.full_like(path.shapes.x, np.nan)
-    modes[4] = 0.0
-    modes[4, :, 1] = np.cos(np.arange(EDGES))
-    rows = written(tmp_path, path, modes=modes).rows("/ring/softest_mode", "LineStrips3D:strips")
-    assert rows[3] == []
+def test_softest_mode_is_a_ghost_but_not_in_a_fall(path, tmp_path):
+    """Displaced by the mode, at most by a fifth of the ring's radius."""
+    u = np.zeros_like(path.shapes.x)
+    u[:, :, 1] = np.cos(np.arange(EDGES))
+    falls = falling(softened(path, ("odd",), np.ones((len(path), 1)), u))
+    rows = written(tmp_path, falls).rows("/ring/softest_mode", "LineStrips3D:strips")
+    assert rows[falls.shapes.falls[0].after + 1] == []
     moved = np.array(rows[4][0])[:-1] - path.shapes.x[4]
     assert_allclose(moved[:, [0, 2]], 0, atol=1e-6)
     assert np.abs(moved).max() == pytest.approx(0.2, rel=0.01)
+
+
+def test_mode_without_displacements_has_no_ghost(path, tmp_path):
+    """As of a ring that only spins about its own centreline."""
+    still = softened(path, ("odd",), np.ones((len(path), 1)), 0.0 * path.shapes.x)
+    rows = written(tmp_path, still).rows("/ring/softest_mode", "LineStrips3D:strips")
+    assert set(map(len, rows.values())) == {0}
+
+
+def test_a_snap_is_a_dotted_drop_and_no_part_of_the_curve(tmp_path):
+    """The smooth strips end at the fold; the dashes begin there and end at the landing."""
+    scene = der.Scene(
+        der.circle(), der.rectangular_section(1.6), n_edges=EDGES, control="angle", shapes=True
+    )
+    path = der.fold(scene)
+    read = written(tmp_path, path)
+    (snap,) = (point.position for point in path.points if point.kind == "snap")
+    dots = read.rows("/curves/moment/now", "Points2D:positions")
+    dashes = np.array(read.rows("/curves/moment/snaps", "LineStrips2D:strips")[None])
+    assert len(dashes) > 10
+    assert_allclose(dashes[0, 0], dots[snap - 1][0], atol=1e-4)
+    assert np.hypot(*(dashes[-1, -1] - dots[snap][0])) < 1.5
+    curve = read.rows("/curves/moment/stable", "LineStrips2D:strips")[None]
+    assert [len(strip) > 10 for strip in curve] == [True, True]
+    assert_allclose(curve[0][-1], dots[snap - 1][0], atol=1e-4)
+    assert_allclose(curve[1][0], dots[snap][0], atol=1e-4)
 
 
 def test_rest_takes_the_place_of_the_flat_ring(path):
@@ -380,21 +411,9 @@ def test_path_that_does_not_begin_flat_needs_its_natural_strains(path):
         playback(cut(path, slice(3, None)))
 
 
-@pytest.mark.parametrize("name", ["eigenvalues", "modes", "rest"])
-def test_wrong_shape_is_named(path, name):
-    with pytest.raises(ValueError, match=rf"{name} must have shape \(.*, got \(2,\)"):
-        playback(path, **{name: np.zeros(2)})
-
-
-def test_motion_of_another_ring_is_refused(path):
-    motion = replace(a_motion(path), x=np.zeros((5, 3, 3)))
-    with pytest.raises(ValueError, match="x of a motion must have shape"):
-        playback(path, motions=[motion])
-
-
-def test_motion_from_nowhere_is_refused(path):
-    with pytest.raises(ValueError, match="after of a motion must be a state, 0 to"):
-        playback(path, motions=[replace(a_motion(path), after=len(path))])
+def test_rest_of_another_ring_is_refused(path):
+    with pytest.raises(ValueError, match=r"rest must have shape \(32, 3\), got \(2, 3\)"):
+        playback(path, rest=np.zeros((2, 3)))
 
 
 @pytest.mark.parametrize("name", ["film.mp4", "film", "rrd"])

@@ -24,13 +24,20 @@ import numpy as np
 import der
 from der.assembly import assemble, take_out
 from der.block_ldl import factor
+from der.control import follow_angle
 from der.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
+from der.relaxed_march import follow_relaxed
 from der.rod import State
 from der.scene import MEASURES
 from der.sector import Sector, sector
+from der.snap import Landing, snap
+from der.special import Visit, Wanted
+from der.step import Tally
+from validation.bench_bvp import rows as bvp_rows
 from validation.curves import ReferenceCurve, curve_error, fold_error, read_reference
 
 REFERENCE = Path(__file__).parent / "reference"
+Follower = Callable[[Sector, Wanted, Tally], Iterator[Visit]]
 CASES = {4.0: "circ_ht4", 1.6: "circ_ht1.6", 1.0: "circ_ht1_beyond_pi"}
 
 
@@ -88,8 +95,12 @@ def measure(*, quick: bool = False) -> Iterator[Row]:
     repeats = 5 if quick else 15
     yield from _paths(repeats)
     yield from _needs(repeats)
+    yield from _relaxation((32, 64, 128) if quick else (32, 64, 128, 256))
+    yield from _snaps(repeats)
+    yield from _recording(repeats)
     yield from _errors((32, 64, 128) if quick else (32, 64, 128, 256, 512))
     yield from _newton((64, 1024) if quick else (64, 256, 1024, 4096, 16384, 65536))
+    yield from (Row(*row) for row in bvp_rows(cpu_time, 3 if quick else repeats))
     yield from _start_up(2 if quick else 5)
 
 
@@ -148,6 +159,7 @@ def _needs(repeats: int) -> Iterator[Row]:
         "stability": {"stability": True},
         "contacts": {"contacts": True},
         "shapes": {"shapes": True},
+        "shapes with softest modes": {"shapes": True, "modes": True},
         "full ring": {"sector": "full"},
         "half ring": {"sector": "half"},
         "finite stretch": {"stretch": "finite"},
@@ -156,6 +168,59 @@ def _needs(repeats: int) -> Iterator[Row]:
         scene = _circle(4.0, **{**bare, **wants})
         seconds = cpu_time(lambda scene=scene: der.fold(scene), repeats)  # type: ignore[misc]
         yield Row("need", name, seconds / base, "times")
+
+
+def _relaxation(sizes: tuple[int, ...]) -> Iterator[Row]:
+    """The march of the angle by dynamic relaxation alone against the same by Newton, over N."""
+    wanted = Wanted(stability=False, contacts=False)
+    for n in sizes:
+        piece = sector(der.circle(), der.rectangular_section(4.0), n)
+
+        def march(follow: Follower, tally: Tally, piece: Sector = piece) -> int:
+            return len(list(follow(piece, wanted, tally)))
+
+        newton, relaxed = Tally(), Tally()
+        states = march(follow_relaxed, relaxed), march(follow_angle, newton)
+        times = [
+            cpu_time(lambda follow=follow, march=march: march(follow, Tally()), 5)  # type: ignore[misc]
+            for follow in (follow_relaxed, follow_angle)
+        ]
+        per_state = [1e3 * t / k for t, k in zip(times, states, strict=True)]
+        case = f"h/t 4, N {n}, quarter"
+        note = f"{relaxed.force_evaluations} force evaluations, {1e3 * times[0]:.0f} ms"
+        yield Row("relaxation", f"{case}, a state", per_state[0], "ms", None, note)
+        note = f"{newton.newton_iterations} Newton iterations, {1e3 * times[1]:.0f} ms"
+        yield Row("relaxation", f"{case}, a state by Newton", per_state[1], "ms", None, note)
+
+
+def _snaps(repeats: int) -> Iterator[Row]:
+    """One snap: dynamic relaxation past the fold, and the polish by Newton."""
+    wanted = Wanted(stability=False, contacts=False)
+    for name in ("quarter", "full"):
+        piece = sector(der.circle(), der.rectangular_section(1.6), 64, name=name)
+        before = next(v.at for v in follow_angle(piece, wanted, Tally()) if v.kind == "fold")
+
+        def fall(piece: Sector = piece, before: Equilibrium = before) -> Landing:
+            return snap(piece, wanted, Tally(), before, before.tangent)
+
+        seconds = cpu_time(fall, repeats)
+        note = f"{fall().details['force_evaluations']} force evaluations"
+        yield Row("snap", f"h/t 1.6, N 64, {name}", 1e3 * seconds, "ms", 100.0, note)
+
+
+def _recording(repeats: int) -> Iterator[Row]:
+    """A recording for playback: 400 equilibria of 128 edges, scaled from what the path has."""
+    from der.view_rerun import recording_bytes
+
+    gammas = tuple(np.linspace(0.0, np.pi, 361)[1:])
+    scene = _circle(1.6, n_edges=128, shapes=True, stability=False, save_at=gammas)
+    path = der.fold(scene)
+    share = 400.0 / len(path)
+    size = len(recording_bytes(path)) * share
+    seconds = cpu_time(lambda: recording_bytes(path), min(repeats, 5)) * share
+    case = "400 steps, 128 edges"
+    yield Row("recording", f"{case}, file", 1e-6 * size, "MB", 10.0)
+    yield Row("recording", f"{case}, made", seconds, "s", 1.0)
 
 
 def _errors(sizes: tuple[int, ...]) -> Iterator[Row]:
