@@ -1,0 +1,115 @@
+"""Rod and boundary-value problem in one picture: the curves, and how far they lie apart."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path as File
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from der.files import FilePath, write_whole
+from der.record import Path
+from der.summary import headline
+from validation.comparison import Comparison
+
+FORMATS = (".png", ".pdf", ".svg")
+ROD, BVP, BAR = "#D55E00", "#0072B2", "#8a8a8a"
+FLOOR = 1e-13  # of the distances drawn: rounding
+
+
+def figure_of_comparison(comparison: Comparison) -> Figure:
+    """M and U of both against gamma; below, normal distances of the rod's states and their bars."""
+    figure = Figure(figsize=(8.0, 7.0), dpi=150, facecolor="white")
+    FigureCanvasAgg(figure)
+    rod = comparison.rod
+    figure.suptitle(headline(rod), fontsize=10)
+    grid = figure.add_gridspec(2, 2, left=0.085, right=0.98, bottom=0.085, top=0.93, wspace=0.22)
+    for column, (name, label) in enumerate((("moment", "M a/GJ"), ("energy", "U a/GJ"))):
+        above = figure.add_subplot(grid[0, column])
+        below = figure.add_subplot(grid[1, column])
+        _curves(above, comparison, name, label)
+        _distances(below, comparison, name)
+    return figure
+
+
+def save_comparison(comparison: Comparison, file: FilePath) -> None:
+    """Write the figure, whole or not at all, in the format of the file's suffix.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is not one of FORMATS.
+    OSError
+        If the file cannot be written.
+    """
+    suffix = File(file).suffix.lower()
+    if suffix not in FORMATS:
+        raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
+    figure = figure_of_comparison(comparison)
+    write_whole(file, lambda opened: figure.savefig(opened, format=suffix[1:]))
+
+
+def _curves(axes: Axes, comparison: Comparison, name: str, label: str) -> None:
+    """Both paths; the rod's states as open circles on the other's line."""
+    rod, bvp = comparison.rod, comparison.bvp
+    axes.plot(
+        bvp.gamma / math.pi,
+        getattr(bvp, name),
+        color=BVP,
+        linewidth=1.4,
+        label=f"boundary-value problem, {bvp.numerics['intervals']} intervals",
+    )
+    axes.plot(
+        rod.gamma / math.pi,
+        getattr(rod, name),
+        linestyle="none",
+        marker="o",
+        markersize=3.6,
+        markerfacecolor="none",
+        color=ROD,
+        label=f"rod, {rod.numerics['n_edges']} edges{_extrapolated(rod)}",
+    )
+    axes.set_xlabel("$\\gamma/\\pi$")
+    axes.set_ylabel(label)
+    axes.margins(x=0.02)
+    axes.legend(frameon=False, fontsize=7.5, loc="best")
+
+
+def _extrapolated(rod: Path) -> str:
+    return "" if rod.error is None else ", extrapolated"
+
+
+def _distances(axes: Axes, comparison: Comparison, name: str) -> None:
+    """Normal distances in path order, with the bars that allow for them."""
+    states = comparison.states
+    gamma = np.array([state.gamma for state in states]) / math.pi
+    distance = np.array([getattr(state, f"{name}_distance") for state in states])
+    bars = [getattr(state, f"{name}_bar") for state in states]
+    axes.semilogy(
+        gamma,
+        np.maximum(distance, FLOOR),
+        linestyle="none",
+        marker="o",
+        markersize=3.6,
+        color=ROD,
+        label="normal distance",
+    )
+    known = [k for k, bar in enumerate(bars) if bar is not None]
+    if known:
+        axes.semilogy(
+            gamma[known],
+            [bars[k] for k in known],
+            linestyle="none",
+            marker="_",
+            markersize=8,
+            color=BAR,
+            label="error bar",
+        )
+    axes.set_xlabel("$\\gamma/\\pi$")
+    axes.set_ylabel("distance in the scaled plane")
+    axes.set_ylim(bottom=0.5 * FLOOR)
+    axes.margins(x=0.02)
+    axes.legend(frameon=False, fontsize=7.5, loc="best")
