@@ -475,20 +475,20 @@ def figure(
 ) -> None:
     """Draw the paper's figures: PNG, and the data as CSV."""
     with _options_named():
-        from validation.figures import draw
+        from validation.figures import FIGURES, Interrupted, draw
 
-        folder = File(out)
+        chosen = list(FIGURES) if names == ["all"] else names
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as wrong:
-            raise ValueError(f"out must be a folder, got {out!r}: {wrong.strerror}") from None
-        check_writable("out", folder / "figure.png")
-        done = draw(names, folder, workers=workers)
-    for file in done.written:
+            drawn = draw(chosen, out, workers=workers)
+        except Interrupted as stopped:
+            drawn, code = stopped.drawn, 130
+        else:
+            code = 3 if drawn.failed else 0
+    for file in (file for files in drawn.written.values() for file in files):
         show(str(file))
-    for name, reason in done.failed.items():
+    for name, reason in drawn.failed.items():
         say(f"der: {name} failed: {reason}")
-    raise typer.Exit(3 if done.failed else 0)
+    raise typer.Exit(code)
 
 
 @app.command()

@@ -32,6 +32,10 @@ class Outline(Protocol):
     def breaks(self) -> tuple[float, ...]:
         """Arc lengths of the jumps in curvature."""
 
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Arc lengths at which the curvature is not smooth, jumps among them."""
+
     def angle(self, s: Array) -> Array:
         """Tangent angle Theta, from 0 to 2 pi."""
 
@@ -85,6 +89,11 @@ class PiecewiseLinear:
         """Arc lengths of the jumps in curvature."""
         jumps = self.curvature_end[:-1] != self.curvature_start[1:]
         return tuple(self.knots[1:-1][jumps].tolist())
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Arc lengths of all knots."""
+        return tuple(self.knots[1:-1].tolist())
 
     def angle(self, s: Array) -> Array:
         """Tangent angle at `s`, exactly."""
@@ -170,6 +179,11 @@ class Ellipse:
     @property
     def breaks(self) -> tuple[float, ...]:
         """No jumps in curvature."""
+        return ()
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """None: its curvature is analytic."""
         return ()
 
     def angle(self, s: Array) -> Array:

@@ -82,6 +82,11 @@ class Ring:
         """Arc lengths in (0, L) at which the natural curvature jumps, increasing."""
         return self.outline.breaks
 
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Arc lengths in (0, L) at which the natural curvature is not smooth, increasing."""
+        return self.outline.kinks
+
     def angle(self, s: ArrayLike) -> Array:
         """Return the tangent angle Theta of the closed ring, rad: 2 pi more with every turn."""
         turns, local = self._around(s)

@@ -8,6 +8,8 @@ from typing import Any
 
 from der.record import AtPi, Mode, Path, Point
 
+_FAR = 1e-2  # rad: a snap over more, under a dead moment, says where it began
+
 
 def summary(path: Path) -> str:
     """What a user wants to know first: the ring, its mode, the special points, the cost."""
@@ -16,8 +18,8 @@ def summary(path: Path) -> str:
         lines.append(mode_in_words(path.mode))
     elif path.status == "done" and path.at_pi is None and len(path):
         lines.append(f"ends at gamma = {path.gamma[-1]:.6g}, before pi")
-    if path.status != "done":
-        lines.append(f"{path.status}: {path.message}")
+    if path.message:
+        lines.append(path.message if path.status == "done" else f"{path.status}: {path.message}")
     if path.points:
         lines += ["", f"{'':9}{'gamma':>12}{'gamma/pi':>10}{'M a/GJ':>12}{'U a/GJ':>12}  index"]
         lines += [_row(point) for point in path.points]
@@ -81,6 +83,9 @@ def _row(point: Point) -> str:
     extra = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in point.details.items())
     if point.kind == "snap":
         extra = f"releases {point.details['energy_released']:.7g}"
+        start = point.details.get("gamma_fold")
+        if isinstance(start, float) and abs(start - point.gamma) > _FAR:
+            extra += f", from gamma = {start:.7g}"
     numbers = f"{point.gamma:12.8f}{point.gamma / math.pi:10.6f}{point.moment:12.7f}"
     return f"{point.kind:9}{numbers}{point.energy:12.7f}  {index:7} {extra}".rstrip()
 

@@ -188,12 +188,12 @@ def test_package_imports_its_names_when_they_are_used():
 
 
 def test_modules_are_not_imported_by_text_but_in_the_package():
-    """import_module and __import__ would escape the scan; only der/__init__ may use them."""
+    """import_module and __import__ would escape the scan; only the packages' own files use them."""
     for file in {*files("der"), *files("scenarios"), *files("validation")}:
         nodes = list(ast.walk(ast.parse(file.read_text())))
         words = {node.id for node in nodes if isinstance(node, ast.Name)}
         words |= {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-        if file != HOUSE / "der/__init__.py":
+        if file not in (HOUSE / "der/__init__.py", HOUSE / "validation/__init__.py"):
             assert not words & {"import_module", "__import__"}, file
 
 
@@ -201,8 +201,11 @@ def test_modules_are_not_imported_by_text_but_in_the_package():
     "file", [f for f in files("validation") if f.stem not in BENCHES], ids=lambda file: file.stem
 )
 def test_validation_knows_only_the_statement_and_the_answer(file):
-    """Else the two solvers would not be independent; benches time the engine and may use it."""
-    allowed = {*ROOMS["statement"], *ROOMS["answer"]}
+    """Else the two solvers would not be independent; benches time the engine and may use it.
+
+    The words of a summary are part of the answer.
+    """
+    allowed = {*ROOMS["statement"], *ROOMS["answer"], "summary"}
     assert not [named(file, i) for i in imports(file) if part(i) and part(i) not in allowed]
 
 
@@ -242,8 +245,16 @@ def test_only_commands_import_validation_and_scenarios():
     [
         ("typer", {"der/cli.py"}),
         ("click", set()),
-        ("rich", {"der/cli.py"}),
-        ("matplotlib", {"der/view_plots.py"}),
+        ("rich", {"der/cli.py", "validation/figures/drawing.py"}),
+        (
+            "matplotlib",
+            {
+                "der/view_plots.py",
+                "validation/comparison_plot.py",
+                "validation/figures/canvas.py",
+                "validation/packing_figures.py",
+            },
+        ),
         ("rerun", {"der/view_layout.py", "der/view_rerun.py"}),
         ("dask", set()),
         ("distributed", set()),

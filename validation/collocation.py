@@ -17,7 +17,7 @@ ADVICE = {
     SLOW: "Newton's method does not converge",
     SINGULAR: "the collocation equations are singular",
 }
-CLOSE = 1e-7  # increment of the last iteration but one; its square is rounding
+CLOSE = 1e-9  # last increment; rates and places are those before it
 
 
 class Direction(NamedTuple):

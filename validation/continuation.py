@@ -26,7 +26,7 @@ SMALLEST_STEP = 1e-8
 ANGLE = 0.15  # rad, aimed at between tangents of neighbouring states
 SHARPEST = 0.6  # rad, a step that turns more is repeated shorter
 STRAIGHT = 0.01  # bulge of a step that is believed although its ends are oriented unequally
-MOST_STEPS = 4000
+MOST_STEPS = 2000
 FEWEST_INTERVALS, MOST_INTERVALS = 3, 4000
 REFIT = 4  # steps after which the mesh is fitted again
 SAFETY = 0.25  # of the tolerance: the error aimed at
@@ -181,13 +181,10 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
     Stuck
         Where the path cannot be continued, after all that was found has been handed out.
     """
-    n = max(FEWEST_INTERVALS, len(system.sector.joints) - 1)
-    here = system.flat(n)
-    if isinstance(here, Failure):
-        raise Stuck(f"the flat ring is no solution: {here.reason}")
+    here, error, n = _flat(system, wanted)
     tally.newton_iterations += here.iterations
     scales = Scales(here)
-    yield Visit(here, system.error(here))
+    yield Visit(here, error)
     bend: Direction | None = None  # rate of change of the tangent over the last step
     length, age = FIRST_STEP, 0
     while True:
@@ -207,7 +204,12 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
                 continue
             size = max(scales.largest(visit.at, visit.error) for visit in found)
         if size > wanted.tolerance:
-            n = _refined(len(here.mesh.h), size, wanted.tolerance)
+            if n >= _most(system):
+                raise Stuck(
+                    f"an error of {size:.2g} is left on {n} intervals at gamma = {here.gamma:.6f}"
+                )
+            # at least one more than asked for last: a mesh rounds to what its joints allow
+            n = min(max(n + 1, _refined(len(here.mesh.h), size, wanted.tolerance)), _most(system))
             here = _refitted(system, tally, here, step.end, n)
             bend, length, age = None, step.length, 0
             continue
@@ -215,8 +217,6 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
         yield from found
         if ended:
             return
-        if step.end.gamma < -wanted.gamma_max:
-            raise Stuck(f"the path has turned back to gamma = {step.end.gamma:.6f}")
         angle = _between(step.start, step.end)
         ease = math.sqrt(ANGLE / max(angle, 1e-3))
         if step.end.iterations > 4:
@@ -234,13 +234,31 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
             here, bend, age = _refitted(system, tally, here, here, n), None, 0
 
 
+def _flat(system: Collocation, wanted: Wanted) -> tuple[Solution, Error, int]:
+    """The flat ring on a mesh fine enough, its error, and about how many intervals that has."""
+    n = max(FEWEST_INTERVALS, len(system.sector.joints) - 1)
+    while True:
+        found = system.flat(n)
+        if isinstance(found, Failure):
+            raise Stuck(f"the flat ring is no solution: {found.reason}")
+        error = system.error(found)
+        if Scales(found).largest(found, error) <= wanted.tolerance or n >= _most(system):
+            return found, error, n
+        n = min(2 * n, _most(system))
+
+
+def _most(system: Collocation) -> int:
+    """Intervals that a mesh may have."""
+    return max(MOST_INTERVALS, 4 * len(system.sector.joints))
+
+
 def _refined(n: int, size: float, tolerance: float) -> int:
     """Intervals that bring an error of order h^8 to the one aimed at."""
     if not math.isfinite(size):
         factor = 1.5
     else:
         factor = (max(size, 1e-300) / (SAFETY * tolerance)) ** 0.125
-    return min(max(math.ceil(n * min(max(factor, 0.8), 1.6)), FEWEST_INTERVALS), MOST_INTERVALS)
+    return max(math.ceil(n * min(max(factor, 0.8), 1.6)), FEWEST_INTERVALS)
 
 
 def _refitted(system: Collocation, tally: Tally, here: Solution, fit: Solution, n: int) -> Solution:
@@ -396,7 +414,7 @@ def _at_targets(wanted: Wanted, step: Step, folds: list[Mark]) -> tuple[list[Mar
                 continue
             s, at = (b.s, b.at) if gamma == high else step.at_gamma(gamma, a.s, b.s)
             marks.append(Mark(s, at, ""))
-            if gamma == wanted.gamma_max:
+            if abs(gamma) == wanted.gamma_max:  # also of a path that has turned back for good
                 return marks, True
             if wanted.until is not None and gamma == math.pi and wanted.until(at):
                 return marks, True
@@ -410,6 +428,6 @@ def _between_targets(wanted: Wanted, low: float, high: float) -> Iterator[float]
     if targets is None:
         first, last = math.floor(low / EIGHTH), math.ceil(high / EIGHTH)
         targets = tuple(k * EIGHTH for k in range(first, last + 1))
-    for gamma in (*targets, math.pi, wanted.gamma_max):
+    for gamma in (*targets, math.pi, wanted.gamma_max, -wanted.gamma_max):
         if low <= gamma <= high:
             yield gamma

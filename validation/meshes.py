@@ -1,6 +1,6 @@
 """Meshes of a sector, fitted to a solution.
 
-Mesh points sit at every jump of the natural curvature; between them the intervals share the
+Mesh points sit where the natural curvature is not smooth; between them the intervals share the
 (m+1)-th derivative of the solution equally, as in COLSYS and AUTO (de Boor 1973; Ascher, Mattheij &
 Russell 1995, section 9.3).
 """

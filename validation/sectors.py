@@ -39,7 +39,7 @@ class Sector:
     ring: Ring
     begin: float  # arc length of the ring at the piece's start, a
     length: float  # of the piece, a
-    joints: tuple[float, ...]  # where the natural curvature jumps, from 0 to length
+    joints: tuple[float, ...]  # where the natural curvature is not smooth, from 0 to length
     piece: Piece  # what the kernels know
 
     @property
@@ -82,7 +82,7 @@ def sector(scene: Scene) -> Sector:
         )
     begin = 0.25 * ring.length if quarter else 0.0
     length = 0.5 * ring.length - begin
-    inside = [s - begin for s in ring.breaks if begin + 1e-12 < s < begin + length - 1e-12]
+    inside = [s - begin for s in ring.kinks if begin + 1e-12 < s < begin + length - 1e-12]
     ends = np.array([begin, begin + length])
     half = 0.5 * (ring.angle(ends) - 0.5 * np.pi)
     zero = np.zeros(2)

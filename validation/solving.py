@@ -12,7 +12,7 @@ from importlib.metadata import version
 import numpy as np
 
 from der.checks import checked_number, counts
-from der.record import AtPi, Path, Point, Timing, folding_mode
+from der.record import AtPi, Mode, Path, Point, Timing, folding_mode
 from der.ring import circle
 from der.scene import Scene
 from der.sections import section
@@ -26,6 +26,8 @@ from validation.unfolding import full_ring, turning
 
 TOLERANCE = 1e-8
 FINEST, COARSEST = 1e-11, 1e-3
+ACROSS = 0.4  # of the tolerance: errors across the path, which at equal gamma show larger
+_NEVER = "gamma turns back before gamma_max, and the path runs to -gamma_max without arriving"
 _FLAT = 1e-6  # out-of-plane extent of a folded ring, a
 HOW = (
     "change of the state, across the path, on a collocation mesh of half the intervals' length; "
@@ -83,7 +85,7 @@ def solve_visits(
         gamma_max=math.inf if until_folded and not beyond else scene.gamma_max,
         until=(lambda at: three_covered(system, at)) if until_folded else None,
         targets=None if scene.save_at is None else tuple(scene.save_at),
-        tolerance=tolerance,
+        tolerance=ACROSS * tolerance,
     )
     tally = Tally()
     visits: list[Visit] = []
@@ -105,7 +107,8 @@ def solve_visits(
         raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
     except KeyboardInterrupt:
         raise Interrupted(record("interrupted", "stopped by the user")) from None
-    return record("done"), visits
+    message = _NEVER if visits[-1].at.gamma == -scene.gamma_max else ""
+    return record("done", message), visits
 
 
 def check(scene: object, tolerance: object) -> None:
@@ -170,6 +173,8 @@ def _record(
                 gamma[: k + 1], moments[: k + 1], before, at_pi, three_covered=covered
             )
             break
+    if message == _NEVER and float(gamma.max()) < math.pi:
+        mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
     unknown = counts("index", [None] * len(visits))
     error = {
         name: [float(getattr(visit.error, name)) for visit in visits]

@@ -1,0 +1,116 @@
+"""The paper's figures, each a picture NAME.png and the table NAME.csv of what it shows.
+
+    drawn = draw(["fig2b", "fig11"], "figures")   # files by name, and what went wrong by name
+
+What draws and solves is imported when a figure is drawn, so that the names cost nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path as File
+from typing import TypeAlias
+
+from der.files import FilePath
+from validation.figures.drawing import Drawn, Interrupted
+from validation.figures.drawing import draw as _draw
+
+__all__ = ["FIGURES", "Drawn", "Interrupted", "draw"]
+
+Draw: TypeAlias = Callable[[FilePath], list[File]]
+
+
+def draw(names: list[str] | tuple[str, ...], folder: FilePath, workers: int | None = None) -> Drawn:
+    """Draw figures side by side, one thread each, and say what was written.
+
+    New Python processes are started, so a script calls this under ``if __name__ == "__main__"``.
+
+    Parameters
+    ----------
+    names : of FIGURES
+    folder : where the files go; made if it is not there
+    workers : how many figures at a time; None: as many as there are cores
+
+    Returns
+    -------
+    Drawn
+        A figure that fails is in `failed`, and the others are drawn all the same.
+
+    Raises
+    ------
+    ValueError
+        For a name that is not one of FIGURES, a number of workers below 1, or a folder that is
+        none and cannot be made.
+    Interrupted
+        At Ctrl-C; has what was finished until then. No half-written file is left.
+    """
+    for name in names:
+        if name not in FIGURES:
+            raise ValueError(f"name must be one of {', '.join(FIGURES)}, got {name!r}")
+    return _draw({name: FIGURES[name] for name in names}, folder, workers)
+
+
+def _curves(name: str, folder: FilePath) -> list[File]:
+    from validation.figures import curves
+
+    return _written(curves, name, folder)
+
+
+def _snapshots(name: str, folder: FilePath) -> list[File]:
+    from validation.figures import snapshots
+
+    return _written(snapshots, name, folder)
+
+
+def _profiles(name: str, folder: FilePath) -> list[File]:
+    from validation.figures import profiles
+
+    return _written(profiles, name, folder)
+
+
+def _manifold(name: str, folder: FilePath) -> list[File]:
+    from validation.figures import manifold
+
+    return _written(manifold, name, folder)
+
+
+def _beyond_pi(name: str, folder: FilePath) -> list[File]:
+    from validation.figures import beyond_pi
+
+    return _written(beyond_pi, name, folder)
+
+
+def _packing(name: str, folder: FilePath) -> list[File]:
+    from validation import packing_figures
+
+    return _written(packing_figures, name, folder)
+
+
+def _written(module: object, name: str, folder: FilePath) -> list[File]:
+    """The files of a figure; its function has its name in small letters."""
+    return [File(file) for file in getattr(module, name.lower())(folder)]
+
+
+_HOME: dict[str, Callable[[str, FilePath], list[File]]] = {
+    "fig2b": _manifold,
+    "fig2c": _snapshots,
+    "fig3b": _packing,
+    "fig4b": _curves,
+    "fig4c": _snapshots,
+    "fig6": _packing,
+    "fig7b": _curves,
+    "fig7c": _snapshots,
+    "fig9": _packing,
+    "fig10b": _curves,
+    "fig10c": _curves,
+    "fig10d": _snapshots,
+    "fig10e": _snapshots,
+    "fig11": _curves,
+    "figC1": _beyond_pi,
+    "figC2": _curves,
+    "figD1": _profiles,
+    "figD2": _profiles,
+    "figD3": _profiles,
+}
+FIGURES: dict[str, Draw] = {name: partial(home, name) for name, home in _HOME.items()}

@@ -1,0 +1,151 @@
+"""Following the curve on which a function of two parameters vanishes, across the unit square.
+
+Predictor along the tangent, corrector along the gradient; the function carries a state of its own
+from point to point (`conditions`). Where the curve turns back in one of the parameters nothing
+special happens. It ends at the edges of the square, where it closes, or where the function is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from validation.conditions import Lost
+from validation.gauss import Array
+
+T = TypeVar("T")
+Function = Callable[[Array, T], tuple[float, T]]
+
+LARGEST, SMALLEST = 0.04, 1e-5  # steps, of the square's side
+DIFFERENCE = 1e-5  # for the gradient
+EXACT = 1e-9  # distance from the curve, of the square's side
+SHARPEST = 0.35  # rad, between tangents of neighbouring points
+MOST = 2000
+
+
+class At(NamedTuple, Generic[T]):
+    """A point of the curve."""
+
+    u: Array  # (2,) in the unit square
+    state: T
+    distance: float  # from the curve, estimated: |f|/|grad f|
+
+
+def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> tuple[At[T], Array]:
+    """The point of the curve near ``u``, along the gradient, and the gradient there.
+
+    Raises
+    ------
+    Lost
+        Where there is none within ``near``, or f cannot be evaluated.
+    """
+    start = u
+    value, state = f(u, state)
+    gradient = _gradient(f, u, value, state)
+    for _ in range(12):
+        square = float(gradient @ gradient)
+        if not square > 0.0:
+            raise Lost("the condition does not depend on the parameters")
+        change = -value * gradient / square
+        size = float(np.linalg.norm(change))
+        if size < EXACT:
+            return At(u, state, size), gradient
+        if np.linalg.norm(u + change - start) > near:
+            raise Lost("no point of the curve nearby")
+        before = value
+        u = u + change
+        value, state = f(u, state)
+        # secant update along the way just gone (Broyden)
+        gradient = gradient + (value - before - gradient @ change) / (size * size) * change
+    raise Lost("no point of the curve found")
+
+
+def _gradient(f: Function[T], u: Array, value: float, state: T) -> Array:
+    """By differences, towards the middle of the square."""
+    out = np.empty(2)
+    for k in range(2):
+        h = DIFFERENCE if u[k] < 0.5 else -DIFFERENCE
+        step = np.zeros(2)
+        step[k] = h
+        out[k] = (f(u + step, state)[0] - value) / h
+    return out
+
+
+def trace(f: Function[T], u: Array, state: T) -> list[At[T]]:
+    """The curve through (or near) ``u``, from one end to the other.
+
+    Raises
+    ------
+    Lost
+        Where there is no point of the curve near ``u``.
+    """
+    first, gradient = corrected(f, np.asarray(u, dtype=float), state)
+    ahead, closed = _half(f, first, np.array([-gradient[1], gradient[0]]))
+    if closed:
+        return [first, *ahead]
+    behind, _ = _half(f, first, np.array([gradient[1], -gradient[0]]))
+    return [*reversed(behind), first, *ahead]
+
+
+def _half(f: Function[T], first: At[T], direction: Array) -> tuple[list[At[T]], bool]:
+    """The curve from a point on in one direction, and whether it came back to it."""
+    found: list[At[T]] = []
+    here, tangent = first, direction / np.linalg.norm(direction)
+    step = 0.25 * LARGEST
+    while len(found) < MOST and step >= SMALLEST:
+        u = here.u + step * tangent
+        outside = bool(((u < 0.0) | (u > 1.0)).any())
+        try:
+            new, gradient = corrected(f, np.clip(u, -0.02, 1.02), here.state, near=0.7 * step)
+        except Lost:
+            step *= 0.5
+            continue
+        way = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
+        if way @ tangent < 0.0:
+            way = -way
+        angle = float(np.arccos(np.clip(way @ tangent, -1.0, 1.0)))
+        if angle > SHARPEST or (new.u - here.u) @ tangent <= 0.0:
+            step *= 0.5
+            continue
+        if outside or ((new.u < 0.0) | (new.u > 1.0)).any():
+            if end := _at_edge(f, here, new):
+                found.append(end)
+            return found, False
+        found.append(new)
+        if len(found) > 3 and np.linalg.norm(new.u - first.u) < 0.75 * step:
+            return found, True
+        here, tangent = new, way
+        step = min(step * (1.3 if angle < 0.5 * SHARPEST else 0.8), LARGEST)
+    return found, False
+
+
+def _at_edge(f: Function[T], inside: At[T], outside: At[T]) -> At[T] | None:
+    """The point of the curve on the edge of the square that it crosses first."""
+    way = outside.u - inside.u
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(way > 0.0, (1.0 - inside.u) / way, -inside.u / way)
+    reach[way == 0.0] = np.inf
+    k = int(np.argmin(reach))
+    if not 0.0 < reach[k] <= 1.0:
+        return None
+    other = 1 - k
+    u = inside.u + reach[k] * way
+    u[k] = round(float(u[k]))
+    state, h = inside.state, 1e-4
+    try:
+        value, state = f(u, state)
+        for _ in range(12):
+            if abs(h) < EXACT:
+                return At(u, state, abs(h))
+            ahead = u.copy()
+            ahead[other] += h
+            after, state = f(ahead, state)
+            if after == value:
+                break
+            h = -after * h / (after - value)
+            u, value = ahead, after
+    except Lost:
+        pass
+    return None
