@@ -9,7 +9,7 @@ from bvp import system, visits
 
 import der
 from validation.collocation import collocation
-from validation.continuation import Stuck, Tally, Visit, Wanted, follow, root
+from validation.continuation import Tally, Visit, Wanted, follow, root
 from validation.sectors import sector
 
 EIGHTH = math.pi / 8

@@ -31,10 +31,11 @@ class At(NamedTuple, Generic[T]):
     u: Array  # (2,) in the unit square
     state: T
     distance: float  # from the curve, estimated: |f|/|grad f|
+    gradient: Array  # (2,) of f
 
 
-def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> tuple[At[T], Array]:
-    """The point of the curve near ``u``, along the gradient, and the gradient there.
+def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> At[T]:
+    """The point of the curve near ``u``, along the gradient.
 
     Raises
     ------
@@ -51,7 +52,7 @@ def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> tuple
         change = -value * gradient / square
         size = float(np.linalg.norm(change))
         if size < EXACT:
-            return At(u, state, size), gradient
+            return At(u, state, size, gradient)
         if np.linalg.norm(u + change - start) > near:
             raise Lost("no point of the curve nearby")
         before = value
@@ -81,7 +82,8 @@ def trace(f: Function[T], u: Array, state: T) -> list[At[T]]:
     Lost
         Where there is no point of the curve near ``u``.
     """
-    first, gradient = corrected(f, np.asarray(u, dtype=float), state)
+    first = corrected(f, np.asarray(u, dtype=float), state)
+    gradient = first.gradient
     ahead, closed = _half(f, first, np.array([-gradient[1], gradient[0]]))
     if closed:
         return [first, *ahead]
@@ -98,11 +100,11 @@ def _half(f: Function[T], first: At[T], direction: Array) -> tuple[list[At[T]], 
         u = here.u + step * tangent
         outside = bool(((u < 0.0) | (u > 1.0)).any())
         try:
-            new, gradient = corrected(f, np.clip(u, -0.02, 1.02), here.state, near=0.7 * step)
+            new = corrected(f, np.clip(u, -0.02, 1.02), here.state, near=0.7 * step)
         except Lost:
             step *= 0.5
             continue
-        way = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
+        way = np.array([-new.gradient[1], new.gradient[0]]) / np.linalg.norm(new.gradient)
         if way @ tangent < 0.0:
             way = -way
         angle = float(np.arccos(np.clip(way @ tangent, -1.0, 1.0)))
@@ -138,7 +140,7 @@ def _at_edge(f: Function[T], inside: At[T], outside: At[T]) -> At[T] | None:
         value, state = f(u, state)
         for _ in range(12):
             if abs(h) < EXACT:
-                return At(u, state, abs(h))
+                return At(u, state, abs(h), outside.gradient)
             ahead = u.copy()
             ahead[other] += h
             after, state = f(ahead, state)
