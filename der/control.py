@@ -90,18 +90,41 @@ def follow_angle(
 
 
 def follow_moment(
-    piece: Sector, wanted: Wanted, tally: Tally, *, every: int = 0
+    piece: Sector, wanted: Wanted, tally: Tally, *, unload: bool = False, every: int = 0
 ) -> Iterator[Visit]:
     """Hand out the minima under a growing dead moment, until gamma arrives at ``load_max``.
 
     Past a limit of the moment the ring snaps through, to rest or to the stop at ``load_max``.
+    ``unload`` lowers the moment again: the ring leaves the stop when the moment is its own, snaps
+    at once if it is unstable there, else at the limits on the way, and ends at a stop at gamma = 0.
 
     Raises
     ------
     Stuck
         Where the march cannot go on, after all that was found has been handed out.
     """
-    return _march(piece, wanted, tally, Control.MOMENT, None, every)
+    last: Equilibrium | None = None
+    for one in _march(piece, wanted, tally, Control.MOMENT, None, every):
+        last = one.at
+        yield one
+    if not unload:
+        return
+    down = replace(wanted, load_max=0.0)
+    begin, _ = _begun(piece, down, tally, Control.MOMENT, last)
+    last = begin.at
+    if last.slope < 0.0:
+        # M grows as gamma falls: no dead moment holds the ring once it is off the stop
+        landed = snap(
+            piece, down, tally, last, last.tangent, dead_moment=True, sense=-1.0, every=every
+        )
+        yield landed
+        _check_other_classes(piece, landed)
+        last = landed.at
+        if last.state.load == 0.0:
+            return
+    back = _march(piece, down, tally, Control.MOMENT, last, every)
+    next(back)  # the state that was handed out last
+    yield from back
 
 
 def _march(

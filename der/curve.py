@@ -31,6 +31,8 @@ def smooth(path: Path, height: Array, per: int = 16) -> Array:
 
     The natural cubic spline of the chord length along (gamma, M), which turns with the path through
     folds; on circles it is within 0.3% of the panel of the true path, monotone cubics within 0.4%.
+    Snaps are straight lines, but for the moment of a ring that falls under a dead one: that is
+    level, and ends at the ring's own where it meets a stop.
     """
     values = np.column_stack([path.gamma / math.pi, height])
     place = np.arange(per * (len(path) - 1) + 1) / per
@@ -40,6 +42,11 @@ def smooth(path: Path, height: Array, per: int = 16) -> Array:
         piece = slice(first, last + 1)
         inside = slice(first * per, last * per + 1)
         curve[inside] = _spline(chord[piece], values[piece], place[inside] - first)
+    if path.numerics.get("control") == "moment" and np.array_equal(height, path.moment):
+        for k in _snaps(path):
+            inside = slice((k - 1) * per, k * per)
+            curve[inside, 0] = np.linspace(*values[k - 1 : k + 1, 0], per)
+            curve[inside, 1] = height[k - 1]
     return curve
 
 

@@ -166,7 +166,7 @@ def _march(scene: Scene, piece: Sector, wanted: Wanted, tally: Tally) -> Iterato
     if scene.control == "angle":
         return follow_angle(piece, wanted, tally, unload=scene.unload, every=every)
     if scene.control == "moment":
-        return follow_moment(piece, wanted, tally, every=every)
+        return follow_moment(piece, wanted, tally, unload=scene.unload, every=every)
     return follow(piece, wanted, tally)
 
 

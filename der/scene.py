@@ -45,7 +45,9 @@ class Scene:
     control : "arclength" follows the path of equilibria through its folds; "angle" turns the grips
         and "moment" raises a dead moment: the state is then a minimum, and where it ceases to be
         one the ring snaps.
-    unload : with angle control, come back to gamma = 0 afterwards.
+    unload : with angle or moment control, come back to gamma = 0 afterwards. A dead moment is
+        lowered from that of the ring at ``gamma_max``, through 0 where the folded ring is stable,
+        and the ring ends where gamma stops at 0.
     solver : "newton", or "relaxation": the march of the angle by dynamic relaxation alone.
     gamma_max : the path ends at its first arrival there [rad].
     until : "folded": go on, beyond pi and back, until the three-covered state at pi is reached;
@@ -125,13 +127,12 @@ class Scene:
     def _check_control(self) -> None:
         one_of("control", self.control, CONTROLS)
         one_of("solver", self.solver, SOLVERS)
-        if self.control != "angle":
-            if self.unload:
-                raise ValueError(f"unload must come with control 'angle', got {self.control!r}")
-            if self.solver == "relaxation":
-                raise ValueError(
-                    f"solver 'relaxation' must come with control 'angle', got {self.control!r}"
-                )
+        if self.unload and self.control == "arclength":
+            raise ValueError("unload must come with control 'angle' or 'moment', got 'arclength'")
+        if self.solver == "relaxation" and self.control != "angle":
+            raise ValueError(
+                f"solver 'relaxation' must come with control 'angle', got {self.control!r}"
+            )
         if self.solver == "relaxation" and self.modes:
             raise ValueError("modes must come with solver 'newton', got 'relaxation'")
         if self.control != "arclength":

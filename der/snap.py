@@ -25,6 +25,7 @@ KICK = 0.05  # rad, root mean square: too short is slow, too long is steep in a 
 # costs across the valley is spent at once, and along the valley all of this side is downhill
 _TOLERANCE = 1e-6  # GJ/a, of a relaxation before Newton takes over; finer where it cannot
 _OFF = 1e-3  # rad, before a stop, from where a ring moves that does not rest on it
+_PRESSED = 1e-8  # GJ/a: a moment against a stop that is less than this is rounding
 _FALLS = 8  # relaxations of one snap at most
 
 
@@ -90,7 +91,7 @@ class _Drop:
             self.piece.held,
             start,
             moment=moment,
-            stops=(-np.inf, self.wanted.load_max),
+            stops=self.stops,
             tolerance=tolerance,
             every=self.every,
         )
@@ -116,9 +117,19 @@ class _Drop:
 
     def stopped(self, state: State, short: float = 0.0) -> State:
         """``state`` with its grips turned to the stop or ``short`` of it, nothing else moved."""
-        stop = self.wanted.load_max - short
+        stop = self.wanted.load_max - self.sense * short
         turn = heading(self.piece, stop - state.load)
         return moved(self.piece.held, state, turn).but(load=stop)
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Loads at which a motion under a dead moment ends: where the march ends, too."""
+        end = self.wanted.load_max
+        return (-np.inf, end) if self.sense > 0.0 else (end, np.inf)
+
+    def overruns(self, after: Equilibrium, moment: float) -> bool:
+        """Whether a ring held at the stop would come back from it under a dead moment."""
+        return self.sense * (after.moment - moment) > _PRESSED
 
     @property
     def name(self) -> str:
@@ -146,7 +157,7 @@ def snap(
     mode : softest mode there, pointing downhill, of unit mass-weighted norm.
     dead_moment : whether gamma moves, under the moment of ``before``; it stops at
         ``wanted.load_max``.
-    sense : of the march in gamma, to orient the tangent.
+    sense : of the march in gamma, to orient the tangent; with a dead moment, towards its stop.
     gamma_lost : where stability was lost [rad]; None: at ``before``.
     every : keep every k-th configuration of the relaxation; 0: none.
 
@@ -183,7 +194,7 @@ def _fall(drop: _Drop, kick: Direction, moment: float | None) -> tuple[list[Rela
     fallen: list[Relaxed] = []
     start = moved(piece.held, drop.before.state, kick)
     tolerance, reason = _TOLERANCE, ""
-    pressing = np.inf if moment is None else moment  # against the stop, once it is reached
+    pressing = moment  # against the stop, once it is reached
     for _ in range(_FALLS):
         fallen.append(drop.relaxed(start, moment, tolerance))
         start = fallen[-1].state
@@ -195,9 +206,11 @@ def _fall(drop: _Drop, kick: Direction, moment: float | None) -> tuple[list[Rela
         own = index(piece.body, piece.held, all_modes(piece.held), after.state)
         if not after.converged:
             tolerance, reason = 1e-3 * tolerance, ADVICE[after.outcome]
-        elif own == 0 and moment is None and after.moment > pressing:
+        elif (
+            own == 0 and moment is None and pressing is not None and drop.overruns(after, pressing)
+        ):
             # the stop was only overrun: the ring comes back from it, to where the moment holds it
-            start, moment = drop.stopped(after.state, short=_OFF), drop.before.moment
+            start, moment = drop.stopped(after.state, short=_OFF), pressing
         elif own == 0:
             return fallen, after
         else:

@@ -18,13 +18,17 @@ import numpy as np
 from der.equilibrium import Equilibrium
 from der.rod import strains
 from der.sector import Sector
-from der.stability import index, raw_index
+from der.stability import index_and_stiffness, raw_index
 from der.step import ROOT, Step, root
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-4  # of s, for the passage of a strand: an ideal ring asks for no more
 _BRIEF = 1e-3  # of s, between a passage and its reversal
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
+# of the softest torsion of a ring, GJ (2 pi/L)^2: within a step a mode's stiffness was seen to
+# bulge by 0.002 of it at the median and by 0.06 in one of a hundred
+_SOFT = 0.1
+_NEARLY = 0.25  # of the softer end: a parabola that comes so close to zero is looked at
 
 
 Indices = tuple[int | None, ...]  # by symmetry class, multiplicities not yet applied
@@ -37,6 +41,7 @@ class Visit:
     at: Equilibrium
     kind: str = ""  # "", "fold", "limit", "branch" or "contact"
     index: Indices | None = None
+    stiffness: tuple[float, ...] = ()  # of the softest mode of each class, where index is known
     sides: tuple[Indices, Indices] | None = None  # index before and after a singular state
     link: int | None = None
     details: Mapping[str, object] = field(default_factory=dict)
@@ -57,12 +62,16 @@ class Wanted:
 
 def visit(piece: Sector, wanted: Wanted, at: Equilibrium, **extra: object) -> Visit:
     """A visit with what is wanted of a regular state."""
-    known = None
-    if wanted.stability:
-        known = tuple(
-            index(piece.body, piece.held, modes, at.state) for _, modes in piece.classes.values()
-        )
-    return Visit(at, index=known, **extra)  # type: ignore[arg-type]
+    if not wanted.stability:
+        return Visit(at, **extra)  # type: ignore[arg-type]
+    known, stiffness = zip(
+        *(
+            index_and_stiffness(piece.body, piece.held, modes, at.state)
+            for _, modes in piece.classes.values()
+        ),
+        strict=True,
+    )
+    return Visit(at, index=known, stiffness=stiffness, **extra)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -195,8 +204,11 @@ def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark])
         # across a fold, the first class loses or gains one by the fold itself
         first = 1 if any(a.s < s < b.s for s in folds) else 0
         for c in range(first, len(piece.classes)):
-            ends = ((m.s, (m.visit.index or ())[c]) for m in (a, b))
-            found += _branches(piece, step, c, *ends)
+            places = [(m.s, (m.visit.index or ())[c]) for m in (a, b)]
+            if places[0][1] == places[1][1]:
+                places[1:1] = _between_equals(piece, wanted, step, c, a, b)
+            for low, high in pairwise(places):
+                found += _branches(piece, step, c, low, high)
     line = sorted([*line, *found], key=lambda m: m.s)
     singular = [m.s for m in line if m.visit.kind in ("fold", "branch")]
     return [
@@ -205,6 +217,44 @@ def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark])
         else m
         for m in line
     ]
+
+
+def _between_equals(
+    piece: Sector, wanted: Wanted, step: Step, c: int, a: _Mark, b: _Mark
+) -> list[tuple[float, int | None]]:
+    """A place between two states of equal index where class ``c`` has another, if there is one.
+
+    Two changes of opposite sense within a step show at its ends only by a soft mode. Where there is
+    one, the state midway is looked at, and the one at which the parabola through the three
+    stiffnesses is closest to zero.
+    """
+    ends = [m.visit.stiffness[c] for m in (a, b) if m.visit.stiffness]
+    soft = _SOFT * (2.0 * math.pi / (piece.copies * float(piece.body.length.sum()))) ** 2
+    soft *= float(piece.body.stiffness.min())
+    if len(ends) < 2 or min(map(abs, ends)) > soft or ends[0] * ends[1] < 0.0:
+        return []
+    s = 0.5 * (a.s + b.s)
+    there = (a.visit.index or ())[c]
+    for _ in range(2):
+        seen = visit(piece, wanted, step.at(s))
+        count = (seen.index or ())[c]
+        if count not in (there, None):
+            return [(s, count)]
+        u = _closest(ends[0], seen.stiffness[c], ends[1])
+        if u is None:
+            return []
+        s = a.s + u * (b.s - a.s)
+    return []
+
+
+def _closest(first: float, middle: float, last: float) -> float | None:
+    """Where in (0, 1) the parabola through three values of one sign comes close to zero, if so."""
+    slope, curvature = last - first, 2.0 * (first + last - 2.0 * middle)
+    if curvature * first <= 0.0 or abs(slope) >= abs(curvature):
+        return None
+    u = 0.5 - 0.5 * slope / curvature
+    least = middle - 0.25 * slope * slope / curvature
+    return u if least / first < _NEARLY * min(1.0, last / first) else None
 
 
 def _beside(step: Step, s: float, singular: list[float], end: float) -> tuple[float, float]:

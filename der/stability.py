@@ -15,7 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from der.assembly import assemble, position_rows, take_out
-from der.block_ldl import factor, inertia, solve_refined
+from der.block_ldl import factor, inertia, solve_band, solve_refined
+from der.dense import solve_dense
 from der.frames import Array
 from der.rod import Rod, State
 from der.supports import Supports, check_cut
@@ -46,15 +47,52 @@ def _class_matrix(rod, held, modes, quat, stretch, force, load):
 
 
 @njit(cache=True)
-def _count(rod, held, modes, quat, stretch, force, load, shift):
+def _stiffness(rod, modes, factors):
+    """Estimate of the eigenvalue nearest to zero: the Rayleigh quotient of one inverse iteration.
+
+    It is good where that eigenvalue stands apart from the rest, as one close to zero does.
+    """
+    n, b = modes.free.shape
+    M = factors.schur.shape[0]
+    start, x = np.zeros((n, b, 1)), np.zeros((n, b, 1))
+    for j in range(n):  # neither smooth nor of any symmetry
+        for i in range(b):
+            if modes.free[j, i]:
+                start[j, i, 0] = 0.5 + ((j * b + i) * 0.6180339887498949) % 1.0
+                x[j, i, 0] = rod.length[j] * start[j, i, 0]
+    solve_band(factors.inverse, factors.lower, x)
+    A, y = factors.schur.copy(), np.zeros((M, 1))
+    for j in range(n):
+        for i in range(b):
+            for p in range(M):
+                y[p, 0] -= factors.border[j, i, p] * x[j, i, 0]
+    if not solve_dense(A, y):
+        return 0.0
+    top, bottom = 0.0, 0.0
+    for j in range(n):
+        for i in range(b):
+            if modes.free[j, i]:
+                s = x[j, i, 0]
+                for p in range(M):
+                    s -= factors.lifted[j, i, p] * y[p, 0]
+                top += rod.length[j] * s * start[j, i, 0]
+                bottom += rod.length[j] * s * s
+    return top / bottom if bottom > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _count(rod, held, modes, quat, stretch, force, load, shift, looks):
+    """Index, how safe it is, and (where ``looks``) the stiffness of the softest mode."""
     diag, off, border = _class_matrix(rod, held, modes, quat, stretch, force, load)
     n, b = held.free.shape
     if shift != 0.0:
         for j in range(n):
             for i in range(b):
                 diag[j, i, i] += shift * rod.length[j]
-    negative, margin = inertia(factor(diag, off, border))
-    return negative - modes.axis.shape[0], margin
+    factors = factor(diag, off, border)
+    negative, margin = inertia(factors)
+    stiffness = _stiffness(rod, modes, factors) if looks and negative >= 0 else 0.0
+    return negative - modes.axis.shape[0], margin, stiffness
 
 
 def index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int | None:
@@ -63,20 +101,36 @@ def index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int 
     A state of ``held`` at which the smallest pivot is tiny is factored again with a shift of
     either sign: equal counts certify the index, unequal ones make it None.
     """
+    return _certified(body, held, modes, state, looks=False)[0]
+
+
+def index_and_stiffness(
+    body: Rod, held: Supports, modes: SymmetryClass, state: State
+) -> tuple[int | None, float]:
+    """`index`, and about how stiff the softest mode of the class is [GJ/a^2], with its sign.
+
+    The stiffness is that of `softest_modes`, estimated at little cost: good where it is small.
+    """
+    return _certified(body, held, modes, state, looks=True)
+
+
+def _certified(
+    body: Rod, held: Supports, modes: SymmetryClass, state: State, *, looks: bool
+) -> tuple[int | None, float]:
     check_cut(body, modes.free)
     at = (body, held, modes, state.quat, state.stretch, state.force, state.load)
-    negative, margin = _count(*at, 0.0)
+    negative, margin, stiffness = _count(*at, 0.0, looks)
     if negative >= 0 and margin > _SAFE:
-        return int(negative)
+        return int(negative), stiffness
     shift = _SHIFT * float(body.stiffness.max())
-    below, above = (_count(*at, s)[0] for s in (-shift, shift))
-    return int(below) if below == above >= 0 else None
+    below, above = (_count(*at, s, False)[0] for s in (-shift, shift))
+    return (int(below) if below == above >= 0 else None), stiffness
 
 
 def raw_index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int:
     """The index by the signs of the pivots alone, as a bisection for its changes needs it."""
     at = (body, held, modes, state.quat, state.stretch, state.force, state.load)
-    return int(_count(*at, 0.0)[0])
+    return int(_count(*at, 0.0, False)[0])
 
 
 def all_modes(held: Supports) -> SymmetryClass:

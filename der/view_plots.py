@@ -147,7 +147,7 @@ def _title(path: Path) -> str:
         ", ".join([str(path.ring["shape"]), *ring]),
         bar,
         "boundary-value problem" if edges is None else f"{edges} edges",
-        _words(path.mode) if path.mode else rf"up to $\gamma$ = {_times_pi(path.gamma[-1])}",
+        _words(path.mode) if path.mode else _reach(path),
     ]
     if path.status != "done":
         parts.append(path.status)
@@ -158,6 +158,13 @@ def _times_pi(angle: float) -> str:
     """Return an angle as a multiple of pi: "0", "0.211 π", "π"."""
     multiple = f"{angle / math.pi:.3g}"
     return {"0": "0", "1": "π"}.get(multiple, f"{multiple} π")
+
+
+def _reach(path: Path) -> str:
+    """Return how far a path goes: "up to γ = π", "up to γ = π and back"."""
+    top = float(path.gamma.max())
+    back = " and back" if path.gamma[-1] == 0.0 < top else ""
+    return rf"up to $\gamma$ = {_times_pi(top)}{back}"
 
 
 def _words(mode: Mode) -> str:

@@ -204,6 +204,72 @@ def test_the_dead_moment_only_grows():
     assert all(visit.at.slope > 0.0 for visit in visits if not visit.kind)
 
 
+@pytest.mark.parametrize(("h_over_t", "name"), [(4.0, "quarter"), (4.0, "full"), (1.6, "quarter")])
+def test_a_dead_moment_comes_back_to_the_flat_ring(h_over_t, name):
+    """Loading ends at gamma = pi, unloading at gamma = 0 exactly, where the ring is flat, M = 0."""
+    piece, visits = marched("moment", h_over_t, name, unload=True)
+    gamma = np.array(loads(visits))
+    top = int(np.argmax(gamma))
+    assert gamma[top] == math.pi
+    assert gamma[-1] == 0.0
+    assert np.diff(gamma[top:]).max() <= 0.0
+    assert abs(piece.moment(visits[-1].at.moment)) < 1e-9
+    assert abs(visits[-1].at.energy) < 1e-12
+
+
+def test_the_folded_ring_pops_open_at_its_lower_limit():
+    """At h/t = 4 the moment passes 0 at pi and the ring leaves at dM/ds = 0, where M < 0.
+
+    The same limit as the arclength path's second, to 1e-9 rad; it lands at the stop at 0.
+    """
+    piece, visits = marched("moment", 4.0, unload=True)
+    _, lower = of_kind(visits, "limit")
+    _, landing = of_kind(visits, "snap")
+    assert abs(lower.at.state.load - of_kind(path(4.0), "limit")[1].at.state.load) < 1e-9
+    assert piece.moment(lower.at.moment) < -0.01
+    assert landing.details["gamma_fold"] == lower.at.state.load
+    assert landing.at.state.load == 0.0
+
+
+def test_a_ring_that_is_not_stable_folded_snaps_as_soon_as_it_is_let_go():
+    """At h/t = 2 dM/dgamma < 0 at pi: at M = 0 the ring falls from there to flat, all of U freed."""
+    piece, visits = marched("moment", 2.0, unload=True)
+    folded, opened = of_kind(visits, "snap")
+    assert folded.at.state.load == math.pi
+    assert folded.at.slope < 0.0
+    assert opened.details["gamma_fold"] == math.pi
+    assert opened.at is visits[-1].at
+    assert opened.details["energy_released"] == pytest.approx(piece.copies * folded.at.energy)
+
+
+def test_a_ring_that_is_not_folded_at_pi_unloads_from_the_moment_it_has_there():
+    """At h/t = 1 M(pi) > 0: down from it, one snap back at a limit of M > 0, and on to flat."""
+    piece, visits = marched("moment", 1.0, unload=True)
+    top = next(visit for visit in visits if visit.at.state.load == math.pi)
+    _, back = of_kind(visits, "snap")
+    assert piece.moment(top.at.moment) > back.details["moment_before"] > 0.0
+    assert abs(back.details["moment_after"] - back.details["moment_before"]) < 1e-9
+    assert back.at.state.load < back.details["gamma_fold"]
+
+
+def test_the_dead_moment_only_falls_on_the_way_back():
+    """Between the snaps of unloading M falls from state to state, at stable equilibrium."""
+    _, visits = marched("moment", 1.0, unload=True)
+    top = int(np.argmax(loads(visits)))
+    back = visits[top:]
+    falls = [b.at.moment - a.at.moment for a, b in pairwise(back) if b.kind != "snap"]
+    assert max(falls) < 0.0
+    assert all(visit.at.slope > 0.0 for visit in back if not visit.kind)
+
+
+def test_a_stop_at_zero_that_is_only_overrun_does_not_hold_the_ring():
+    """A motion that would come to rest at gamma > 0 under M > 0 is no landing at 0."""
+    piece, visits = marched("moment", 1.0, unload=True)
+    _, back = of_kind(visits, "snap")
+    assert back.at.state.load > 0.1
+    assert visits[-1].kind != "snap"
+
+
 # --- relaxation alone ---------------------------------------------------------------------------
 
 

@@ -142,3 +142,11 @@ def test_the_last_line_is_the_cost():
 def test_a_record_from_disk_has_the_same_summary():
     """Numbers that were whole, and masks, come back as they were."""
     assert summary(Path.from_json(path().to_json())) == summary(path())
+
+
+def test_a_snap_says_what_it_releases_and_where_it_began():
+    """Under a dead moment gamma moves far; with the angle held there is nothing to add."""
+    for start, end in ((0.5, "releases 2, from gamma = 0.5"), (2.5, "releases 2")):
+        details = {"energy_released": 2.0, "gamma_fold": start}
+        rows = lines(points=(Point("snap", 2.5, 1.5, 7.0, 0, 0, 1, details),))
+        assert any(row.endswith(end) for row in rows)

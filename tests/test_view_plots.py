@@ -134,6 +134,25 @@ def test_snap_is_a_line_of_its_own():
     assert_allclose(jump, ends[0] + along * (ends[1] - ends[0]), atol=1e-12)
 
 
+def test_a_snap_under_a_dead_moment_is_level_and_ends_at_the_ring_s_own():
+    """M is given until gamma meets its stop; the curve goes level, then to the landing."""
+    subject = path(
+        points=(special("snap", 5, 1.5, 1.5),), numerics={"n_edges": 32, "control": "moment"}
+    )
+    ends = np.column_stack([subject.gamma, subject.moment])[4:6] / (np.pi, 1.0)
+    curves = [line.get_xydata() for line in figure_of_path(subject).axes[0].lines]
+    (jump,) = [c for c in curves if len(c) > 2 and np.allclose(c[[0, -1]], ends)]
+    assert_allclose(jump[:-1, 1], ends[0, 1], atol=1e-12)
+    assert jump[-2, 0] == pytest.approx(ends[1, 0])
+
+
+def test_title_of_a_path_that_comes_back_says_so():
+    """Gamma goes up and ends at 0 again."""
+    gamma = np.append(np.linspace(0.0, np.pi, 6), np.linspace(np.pi, 0.0, 6)[1:])
+    subject = path(gamma=gamma, mode=None, at_pi=None, points=())
+    assert figure_of_path(subject).texts[0].get_text().endswith("= π and back")
+
+
 def test_path_without_index_says_that_stability_was_not_computed():
     figure = figure_of_path(path(index=counts([None] * 11)))
     assert legend(figure)[0] == UNKNOWN

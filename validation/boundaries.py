@@ -4,8 +4,8 @@ Wherever neighbouring cases of a scan differ, something happens between them. Th
 conditions that can be followed across the diagram (`conditions`, `tracing`): the folded state loses
 its stability; the fold at which the path turns back reaches gamma = pi; two folds merge in a cusp.
 A fourth is found by bisection of the label between the two cases: the path from the flat ring
-changes partners with another one, and leads elsewhere ("exchange"). A curve is kept where the labels
-on its two sides, solved for, differ by what it bounds.
+changes partners with another one, and leads elsewhere ("exchange"). A curve is kept where the
+labels on its two sides, solved for, differ by what it bounds.
 """
 
 from __future__ import annotations
