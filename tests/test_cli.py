@@ -187,6 +187,7 @@ WRONG = [
     (("bvp", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
     (("bvp", *line()[1:], "--sector", "full"), "--sector", "'full'", "half or quarter"),
     (("bvp", *line()[1:], "--stretch", "finite"), "--stretch", "'finite'", "'inextensible'"),
+    (("compare", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
     (("compare", *line()[1:], "--edges", "24"), "--edges", "24", "divisible by 16"),
     (("figure", "fig99", "--out", "."), "--name", "'fig99'", "fig2b"),
     (line("--egdes", "16"), "--egdes", "No such option", "--edges"),
