@@ -206,7 +206,7 @@ def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark])
         for c in range(first, len(piece.classes)):
             places = [(m.s, (m.visit.index or ())[c]) for m in (a, b)]
             if places[0][1] == places[1][1]:
-                places[1:1] = _between_equals(piece, wanted, step, c, a, b)
+                places[1:1] = _between_equals(piece, step, c, a, b)
             for low, high in pairwise(places):
                 found += _branches(piece, step, c, low, high)
     line = sorted([*line, *found], key=lambda m: m.s)
@@ -220,7 +220,7 @@ def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark])
 
 
 def _between_equals(
-    piece: Sector, wanted: Wanted, step: Step, c: int, a: _Mark, b: _Mark
+    piece: Sector, step: Step, c: int, a: _Mark, b: _Mark
 ) -> list[tuple[float, int | None]]:
     """A place between two states of equal index where class ``c`` has another, if there is one.
 
@@ -231,26 +231,26 @@ def _between_equals(
     ends = [m.visit.stiffness[c] for m in (a, b) if m.visit.stiffness]
     soft = _SOFT * (2.0 * math.pi / (piece.copies * float(piece.body.length.sum()))) ** 2
     soft *= float(piece.body.stiffness.min())
-    if len(ends) < 2 or min(map(abs, ends)) > soft or ends[0] * ends[1] < 0.0:
+    if len(ends) < 2 or min(map(abs, ends)) > soft:
         return []
-    s = 0.5 * (a.s + b.s)
+    _, modes = list(piece.classes.values())[c]
     there = (a.visit.index or ())[c]
-    for _ in range(2):
-        seen = visit(piece, wanted, step.at(s))
-        count = (seen.index or ())[c]
-        if count not in (there, None):
-            return [(s, count)]
-        u = _closest(ends[0], seen.stiffness[c], ends[1])
-        if u is None:
-            return []
+
+    def seen(u: float) -> tuple[tuple[float, int | None], float]:
         s = a.s + u * (b.s - a.s)
-    return []
+        count, stiffness = index_and_stiffness(piece.body, piece.held, modes, step.at(s).state)
+        return (s, count), stiffness
+
+    place, stiffness = seen(0.5)
+    if place[1] == there and (u := _closest(ends[0], stiffness, ends[1])) is not None:
+        place, _ = seen(u)
+    return [] if place[1] in (there, None) else [place]
 
 
 def _closest(first: float, middle: float, last: float) -> float | None:
     """Where in (0, 1) the parabola through three values of one sign comes close to zero, if so."""
     slope, curvature = last - first, 2.0 * (first + last - 2.0 * middle)
-    if curvature * first <= 0.0 or abs(slope) >= abs(curvature):
+    if first * last <= 0.0 or curvature * first <= 0.0 or abs(slope) >= abs(curvature):
         return None
     u = 0.5 - 0.5 * slope / curvature
     least = middle - 0.25 * slope * slope / curvature

@@ -1,0 +1,245 @@
+"""Above which h/t a folded ring is stable: in its grips, under a moment, left alone.
+
+The planar three-covered shape does not depend on the section, and its forces are proportional to
+EI1. So one shape of a ring serves every h/t, and each index, and the slope dM/dgamma, is a function
+of h/t whose last change of sign is a threshold: stable above. Leaving a ring alone sets free what
+the grips held: its index is never below that under a moment.
+
+    python -m scenarios.folded_stability [--out DIR] [--quick]
+
+writes thresholds.csv to DIR (default: out/folded_stability): on 64 and 128 edges, and extrapolated
+to none, which is to be trusted to about a tenth of its distance from the finer mesh.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path as File
+
+import numpy as np
+
+import der
+from der.assembly import assemble
+from der.equilibrium import Equilibrium, equilibrium
+from der.path import follow
+from der.ring import Ring
+from der.rod import State
+from der.sector import Sector, free_ring, sector
+from der.special import Wanted, three_covered
+from der.stability import all_modes, index, softest_modes
+from der.step import Tally
+
+EDGES = 128
+FLATTEST, SLENDEREST = 0.8, 100.0  # h/t between which thresholds are sought
+SCAN = 60  # sections between them, in equal ratios
+EXACT = 1e-7  # of h/t, a bisection's last bracket
+LARGEST_CIRCLE = 0.5 * math.tan(math.pi / 12)  # r/a at which a triangle of 120 degrees is a circle
+
+
+@dataclass(frozen=True)
+class Folded:
+    """A ring's planar three-covered state on one mesh, for a section with EI1/GJ = alpha."""
+
+    ring: Ring
+    n_edges: int
+    alpha: float
+    state: State  # of the ring's smallest sector
+
+    @classmethod
+    def of(cls, ring: Ring, n_edges: int = EDGES, h_over_t: float = 4.0) -> Folded:
+        """The state that twisting reaches at ``h_over_t``; of a D2 ring the only one there is.
+
+        Raises
+        ------
+        ValueError
+            Where twisting does not lead to it.
+        """
+        section = der.rectangular_section(h_over_t)
+        piece = sector(ring, section, n_edges)
+        if ring.symmetry == "D2":
+            at = equilibrium(piece.body, piece.held, _evenly_bent(ring, piece))
+            if at.converged and three_covered(piece, at):
+                return cls(ring, n_edges, section.alpha, at.state)
+        wanted = Wanted(stability=False, contacts=False)
+        *_, last = follow(piece, wanted, Tally())
+        if not three_covered(piece, last.at):
+            raise ValueError(f"ring {ring!r} is not folded by twisting at h/t = {h_over_t}")
+        return cls(ring, n_edges, section.alpha, last.at.state)
+
+    def gripped(self, h_over_t: float, name: str = "auto") -> tuple[Sector, Equilibrium]:
+        """The state in the grips, with another section, on a sector."""
+        section = der.rectangular_section(h_over_t)
+        own = sector(self.ring, section, self.n_edges)
+        if name == "auto":
+            piece, quat = own, self.state.quat
+            force = self.state.force * (section.alpha / self.alpha)
+        else:
+            piece = sector(self.ring, section, self.n_edges, name=name)
+            quat = own.full_frames(self.state)[: piece.body.n_edges]
+            force = np.zeros(len(piece.held.target))
+        start = State(quat, np.zeros(len(quat)), force, math.pi)
+        at = equilibrium(piece.body, piece.held, start, iterations=30)
+        if not at.converged:
+            raise ValueError(f"ring {self.ring!r} at h/t = {h_over_t}: {at.outcome.name}")
+        return piece, at
+
+    def index(self, h_over_t: float) -> int:
+        """Index with the grips held at pi."""
+        piece, at = self.gripped(h_over_t)
+        counts = [
+            (times, index(piece.body, piece.held, modes, at.state))
+            for times, modes in piece.classes.values()
+        ]
+        return sum(times * (count or 0) for times, count in counts)
+
+    def slope(self, h_over_t: float) -> float:
+        """dM/dgamma [GJ/a]."""
+        piece, at = self.gripped(h_over_t)
+        return piece.moment(at.slope)
+
+    def index_moment(self, h_over_t: float) -> int:
+        """Index under a moment."""
+        return self.index(h_over_t) + (self.slope(h_over_t) < 0.0)
+
+    def alone(self, h_over_t: float) -> tuple[Sector, State]:
+        """The full ring without grips: its body, and the state with the forces that close it."""
+        section = der.rectangular_section(h_over_t)
+        own = sector(self.ring, section, self.n_edges)
+        whole = sector(self.ring, section, self.n_edges, name="full")
+        held = free_ring(whole.body)
+        quat = own.full_frames(self.state)
+        force = _closing_force(whole, quat)
+        start = State(quat, np.zeros(len(quat)), force, 0.0)
+        at = equilibrium(whole.body, held, start)
+        return whole, at.state if at.converged else start
+
+    def index_free(self, h_over_t: float) -> int:
+        """Index of the ring left alone."""
+        whole, state = self.alone(h_over_t)
+        held = free_ring(whole.body)
+        count = index(whole.body, held, all_modes(held), state)
+        return -1 if count is None else count  # at a threshold, to rounding
+
+    def softest_free(self, h_over_t: float, count: int = 3) -> list[float]:
+        """Stiffnesses nearest to zero of the ring left alone [GJ/a^2]."""
+        whole, state = self.alone(h_over_t)
+        held = free_ring(whole.body)
+        return softest_modes(whole.body, held, all_modes(held), state, count)[0].tolist()
+
+
+def _evenly_bent(ring: Ring, piece: Sector) -> State:
+    """A D2 ring's folded state: the curvature is the natural one and 4 pi/L (paper, Eq. B.1)."""
+    s = piece.arc_length
+    angle = ring.natural_angle(s) - ring.natural_angle(s[-1])
+    angle += 4.0 * np.pi / ring.length * (s - s[-1])
+    a = 0.5 * (angle + ring.angle(s[-1]) - 0.5 * np.pi)
+    # about E1 by the angle, then about E3 by -pi: (0, 0, 0, -1) o (cos a, sin a, 0, 0)
+    quat = np.stack([0.0 * a, 0.0 * a, -np.sin(a), -np.cos(a)], axis=1)
+    return piece.start.but(quat=quat, load=math.pi)
+
+
+def _closing_force(whole: Sector, quat: np.ndarray) -> np.ndarray:
+    """The internal force of a closed ring at rest, from its frames, by least squares."""
+    held = free_ring(whole.body)
+    system = assemble(whole.body, held, quat, np.zeros(len(quat)), np.zeros(3), 0.0)
+    free = held.free.reshape(-1)
+    border = system.border.reshape(-1, 3)[free]
+    return -np.linalg.lstsq(border, system.grad.reshape(-1)[free], rcond=None)[0]
+
+
+def threshold(is_stable: Callable[[float], bool]) -> float | None:
+    """The h/t above which a state is stable; None where it never is, 0 where it always is.
+
+    The last change in a scan, then bisection.
+    """
+    ratios = np.geomspace(SLENDEREST, FLATTEST, SCAN)
+    high = None
+    for h_over_t in ratios:
+        if not is_stable(float(h_over_t)):
+            break
+        high = float(h_over_t)
+    else:
+        return 0.0
+    if high is None:
+        return None
+    low = float(h_over_t)
+    while high - low > EXACT * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if is_stable(middle) else (middle, high)
+    return 0.5 * (low + high)
+
+
+JUDGES: dict[str, Callable[[Folded, float], bool]] = {
+    "slope": lambda ring, h_over_t: ring.slope(h_over_t) > 0.0,
+    "index": lambda ring, h_over_t: ring.index(h_over_t) == 0,
+    "index_moment": lambda ring, h_over_t: ring.index_moment(h_over_t) == 0,
+    "index_free": lambda ring, h_over_t: ring.index_free(h_over_t) == 0,
+}
+
+
+def thresholds(ring: Ring, n_edges: int = EDGES) -> dict[str, float | None]:
+    """Thresholds of h/t by name of the judge."""
+    state = Folded.of(ring, n_edges)
+    return {
+        name: threshold(lambda h_over_t, judge=judge: judge(state, h_over_t))  # type: ignore[misc]
+        for name, judge in JUDGES.items()
+    }
+
+
+def extrapolated(coarse: float | None, fine: float | None) -> float | None:
+    """Limit for cells of no length, whose square is the error."""
+    if coarse is None or fine is None:
+        return None
+    return fine + (fine - coarse) / 3.0
+
+
+def rings(*, quick: bool = False) -> Iterator[tuple[str, float, Ring]]:
+    """Family, parameter and ring."""
+    yield "circle", 1.0, der.circle()
+    if quick:
+        return
+    for axis in "xy":
+        for b in (0.5, 0.6, 0.7, 0.8, 0.9, 0.95):
+            yield f"ellipse {axis}, b/a", b, der.ellipse(b, axis)
+        for b in (0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8):
+            yield f"stadium {axis}, b/a", b, der.rectangle(b, b, axis)
+        for r in (0.1, 0.3, 0.5):
+            yield f"rectangle b/a = 0.6 {axis}, r/a", r, der.rectangle(0.6, r, axis)
+    for r in (0.1, 0.3, 0.6, 0.8):
+        yield "square, r/a", r, der.rectangle(1.0, r)
+    for degrees, largest in ((60.0, math.sqrt(3) / 6), (120.0, LARGEST_CIRCLE)):
+        for share in (0.25, 0.5, 0.75, 0.9):
+            r = share * largest
+            yield f"triangle {degrees:g} deg, r/a", r, der.triangle(math.radians(degrees), r)
+
+
+def main() -> None:
+    """Print and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=File, default=File("out/folded_stability"))
+    parser.add_argument("--quick", action="store_true", help="the circle alone")
+    asked = parser.parse_args()
+    asked.out.mkdir(parents=True, exist_ok=True)
+    with (asked.out / "thresholds.csv").open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["family", "parameter", "n_edges", *JUDGES])
+        for family, parameter, ring in rings(quick=asked.quick):
+            coarse, fine = (thresholds(ring, n_edges) for n_edges in (EDGES // 2, EDGES))
+            limit = {name: extrapolated(coarse[name], fine[name]) for name in JUDGES}
+            for n_edges, found in ((EDGES // 2, coarse), (EDGES, fine), ("extrapolated", limit)):
+                table.writerow([family, f"{parameter:.6g}", n_edges, *found.values()])
+            words = ", ".join(f"{name} {_word(value)}" for name, value in limit.items())
+            print(f"{family} {parameter:.4g}: {words}", flush=True)
+    print(f"written to {asked.out}")
+
+
+def _word(value: float | None) -> str:
+    return "never" if value is None else "always" if value == 0.0 else f"{value:.4f}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,166 @@
+"""What `der.special` finds on the steps of a path, where special points lie close together."""
+
+import math
+
+import numpy as np
+import pytest
+from rods import lifted
+
+import der
+from der.equilibrium import dot
+from der.path import follow
+from der.sector import sector
+from der.special import Wanted, _closest, special_points, visit
+from der.stability import index, index_and_stiffness, raw_index, softest_modes
+from der.step import Step, Tally
+
+# h/t = 2.5075: beyond the first fold one out-of-phase mode is unstable for 6e-5 rad of gamma
+NEARLY = der.triangle(math.radians(60), 0.0866)
+SECTION = der.rectangular_section(2.5075)
+SIXTY = der.triangle(math.radians(60), 1 / 30)
+STADIUM = der.rectangle(0.2, 0.2)
+
+
+def branches(ring, h_over_t, **numerics):
+    scene = der.Scene(ring, der.rectangular_section(h_over_t), contacts=False, **numerics)
+    path = der.fold(scene)
+    return [(p.gamma, p.details["symmetry"], p.index_before, p.index_after) for p in path.branches]
+
+
+def step_over_both():
+    """The step from before the first fold to a state beyond the second change of the index."""
+    piece = sector(NEARLY, SECTION, 64)
+    wanted = Wanted(contacts=False, stability=False, targets=())
+    found = list(follow(piece, wanted, Tally()))
+    fold = next(k for k, one in enumerate(found) if one.kind == "fold")
+    a, b = (next(v for v in side if not v.kind) for side in (found[fold::-1], found[fold:]))
+    trial = Step(piece, a.at, b.at, 1.0, 1e-10, Tally())
+    return Step(piece, a.at, b.at, dot(piece.body, a.at.tangent, trial.jump), 1e-10, Tally())
+
+
+# --- two changes within one step --------------------------------------------------------------
+
+
+def test_two_changes_of_an_index_within_one_step_are_found():
+    """A class that is unstable on half of a step only, with equal indices at the step's two ends.
+
+    Truth: the index counted at 400 places of the step; what is found lies between neighbours.
+    """
+    step = step_over_both()
+    piece = step.piece
+    modes = piece.classes["out of phase"][1]
+    s = np.linspace(0.0, step.length, 400)
+    counted = np.array([raw_index(piece.body, piece.held, modes, step.at(x).state) for x in s])
+    changes = np.flatnonzero(np.diff(counted))
+    assert counted[0] == counted[-1] == 0
+    assert len(changes) == 2
+    wanted = Wanted(contacts=False, targets=())
+    found, _ = special_points(piece, wanted, step, visit(piece, wanted, step.start))
+    pair = [one for one in found if one.kind == "branch"]
+    assert [one.details["symmetry"] for one in pair] == ["out of phase"] * 2
+    for one, k in zip(pair, changes, strict=True):
+        beyond, before = step.at(s[k + 1]).state.load, step.at(s[k]).state.load
+        assert beyond < one.at.state.load < before  # gamma runs back here
+
+
+def test_both_changes_are_on_the_path():
+    """The whole path has the fold, the two branch points and the other fold, told apart."""
+    found = der.fold(der.Scene(NEARLY, SECTION, contacts=False))
+    kinds = [(p.kind, p.index_before, p.index_after) for p in found.points if p.kind != "limit"]
+    assert kinds == [("fold", 0, 1), ("branch", 1, 2), ("branch", 2, 1), ("fold", 1, 0)]
+
+
+@pytest.mark.parametrize(
+    ("values", "place"),
+    [
+        ((0.04, -0.01, 0.04), 0.5),  # crosses twice
+        ((1.0, 0.1, 0.2), 0.7),  # 2 (u - 0.7)^2 + 0.02
+        ((-0.04, -0.001, -0.04), 0.5),  # the same from below
+        ((0.04, 0.03, 0.04), None),  # far from zero
+        ((0.04, 0.05, 0.04), None),  # bulges away from it
+        ((0.01, 0.05, 0.09), None),  # straight
+    ],
+)
+def test_parabola_through_three_stiffnesses(values, place):
+    """Where it comes within a quarter of its softer end; exact for a parabola."""
+    assert _closest(*values) == (None if place is None else pytest.approx(place, abs=1e-12))
+
+
+# --- places -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("ring", "h_over_t"), [(STADIUM, 1.5), (SIXTY, 4.0)])
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-10])
+def test_branch_points_do_not_depend_on_the_tolerance(ring, h_over_t, tolerance):
+    """Gamma at branch points is good to 1e-8; measured below 1e-12 from 1e-8 on."""
+    found = branches(ring, h_over_t, tolerance=tolerance)
+    exact = branches(ring, h_over_t, tolerance=1e-12)
+    assert [one[1:] for one in found] == [one[1:] for one in exact]
+    assert [one[0] for one in found] == pytest.approx([one[0] for one in exact], abs=1e-10)
+
+
+def test_a_branch_of_one_arm_against_the_other():
+    """The out-of-phase mode of a mirror-symmetric ring crosses zero singly, away from folds.
+
+    Truth: on the full ring the index changes at the same gamma, by one.
+    """
+    half = branches(SIXTY, 4.0)
+    full = branches(SIXTY, 4.0, sector="full")
+    assert [one[1:] for one in half] == [("out of phase", 1, 2), ("out of phase", 2, 1)]
+    assert [one[0] for one in full] == pytest.approx([one[0] for one in half], abs=1e-9)
+    assert [one[2:] for one in full] == [(1, 2), (2, 1)]
+
+
+def test_a_pair_breaks_the_symmetry_of_a_stadium_before_it_is_folded():
+    """The modes of a quarter that are odd come in pairs: the index of the full ring jumps by two.
+
+    The path ends at pi in the planar three-covered ring, whose moment has a positive slope.
+    """
+    for name in ("quarter", "full"):
+        found = der.fold(
+            der.Scene(STADIUM, der.rectangular_section(1.5), sector=name, contacts=False)
+        )
+        gammas = [p.gamma for p in found.branches]
+        assert gammas == pytest.approx([2.9703435] * len(gammas), abs=1e-7)
+        assert (found.branches[0].index_before, found.branches[-1].index_after) == (0, 2)
+        assert found.mode.foldable
+        assert found.mode.stable
+        assert not found.mode.stable_3d
+
+
+# --- the estimate of the stiffness -------------------------------------------------------------
+
+
+def test_stiffness_is_estimated_well_where_it_is_small():
+    """The sign is that of the softest mode, and the value good to 10 % below 0.02 of torsion's.
+
+    Truth: `softest_modes`, converged. The estimate is what one inverse iteration gives.
+    """
+    piece = sector(SIXTY, der.rectangular_section(4.0), 64)
+    torsion = (2.0 * math.pi / SIXTY.length) ** 2
+    soft = 0
+    for one in follow(piece, Wanted(contacts=False, stability=False), Tally()):
+        for _, modes in piece.classes.values():
+            at = (piece.body, piece.held, modes, one.at.state)
+            (exact,), _ = softest_modes(*at)
+            count, estimate = index_and_stiffness(*at)
+            if one.kind != "fold" and abs(exact) < 0.02 * torsion:
+                assert estimate == pytest.approx(exact, rel=0.1)
+                assert count == index(*at)
+                soft += 1
+    assert soft > 5
+
+
+def test_states_of_the_half_are_those_of_the_full_ring():
+    """The class indices of a half at a state add up to the index of the full ring there."""
+    half, full = (sector(SIXTY, der.rectangular_section(4.0), 64, name=s) for s in ("half", "full"))
+    seen = set()
+    for one in follow(half, Wanted(contacts=False), Tally()):
+        if one.kind in ("fold", "branch"):
+            continue
+        whole = lifted(half, one.at.state, full)
+        modes = full.classes["all"][1]
+        counted = raw_index(full.body, full.held, modes, whole.state)
+        assert counted == sum(one.index)
+        seen.add(counted)
+    assert seen == {0, 1, 2}
