@@ -14,10 +14,11 @@ import numpy as np
 from der.assembly import assemble
 from der.checks import counts
 from der.control import follow_angle, follow_moment
+from der.equilibrium import equilibrium
 from der.error_bars import error_bars
 from der.frames import Array
 from der.path import follow
-from der.record import AtPi, Path, Point, Timing, folding_mode
+from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode
 from der.relaxation import relax
 from der.relaxed_march import follow_relaxed
 from der.ring import circle
@@ -99,9 +100,10 @@ def fold(
         raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
     except KeyboardInterrupt:
         raise Interrupted(record("interrupted", "stopped by the user")) from None
+    message = NEVER if visits[-1].at.state.load == -scene.gamma_max else ""
     if scene.error_bars:
-        return _with_error_bars(scene, piece, visits, record)
-    return record("done")
+        return replace(_with_error_bars(scene, piece, visits, record), message=message)
+    return record("done", message)
 
 
 def _piece(scene: Scene, n_edges: int, name: str) -> Sector:
@@ -212,6 +214,8 @@ def _record(
                 gamma, moments[end], before, at_pi, three_covered=three_covered(piece, visit.at)
             )
             break
+    if message == NEVER and at_pi is None:
+        mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
     if scene.control == "moment":
         mode = None  # a ring that fell through under its moment tells nothing of its folds in gamma
     return Path(
@@ -284,7 +288,13 @@ def _free_index(scene: Scene, piece: Sector, visit: Visit) -> int | None:
     force = -np.linalg.lstsq(border, residual, rcond=None)[0]
     scale = float(np.abs(system.diag).max() * whole.body.cell.max())
     if float(np.abs(residual + border @ force).max()) > _BALANCED * scale:
-        return None
+        if not scene.stretching:
+            return None
+        # a grip holds the length of its edge, too: without it the ring settles a little
+        settled = equilibrium(whole.body, held, state.but(force=force), tolerance=scene.tolerance)
+        if not settled.converged:
+            return None
+        state, force = settled.state, settled.state.force
     return index(whole.body, held, all_modes(held), state.but(force=force))
 
 

@@ -71,8 +71,6 @@ def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
         here = found[-1]
         if ended:
             return
-        if here.at.state.load < -wanted.load_max:
-            raise Stuck(f"the path has turned back to gamma = {here.at.state.load:.6f}")
         ease = math.sqrt(_ANGLE / max(angle, 1e-3))
         if step.end.iterations > 4:
             ease = min(ease, 0.7)

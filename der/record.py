@@ -27,6 +27,7 @@ KINDS = ("fold", "limit", "branch", "snap", "contact")
 SNAPPING = ("none", "snap-through", "snap-back")
 STATUSES = ("done", "not converged", "interrupted")
 ARRAYS = ("gamma", "moment", "energy", "index", "index_moment")
+NEVER = "gamma turns back before gamma_max, and the path runs to -gamma_max without arriving"
 ARRIVAL = 1e-9  # rad; a path is solved for at pi to 1e-10
 NO_MOMENT = 1e-6  # of the largest |M|; the folded ring is planar to the same
 

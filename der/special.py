@@ -144,7 +144,7 @@ def _at_targets(
                 continue
             s, at = (s1, b) if load == high else step.at_load(load, s0, s1)
             marks.append(_Mark(s, visit(piece, wanted, at)))
-            if load == wanted.load_max:
+            if abs(load) == wanted.load_max:  # also of a path that has turned back for good
                 return marks, True
             if wanted.until_folded and load == math.pi and three_covered(piece, at):
                 return marks, True
@@ -158,7 +158,7 @@ def _between_loads(wanted: Wanted, low: float, high: float) -> Iterator[float]:
     if targets is None:
         first, last = math.floor(low / EIGHTH), math.ceil(high / EIGHTH)
         targets = tuple(k * EIGHTH for k in range(first, last + 1))
-    for load in (*targets, math.pi, wanted.load_max):
+    for load in (*targets, math.pi, wanted.load_max, -wanted.load_max):
         if low <= load <= high:
             yield load
 

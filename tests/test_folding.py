@@ -476,3 +476,30 @@ def test_controls_that_do_not_go_together_are_refused(wants, name):
     """By the name of what cannot be had."""
     with pytest.raises(ValueError, match=f"^{name} "):
         der.Scene(der.circle(), der.rectangular_section(4.0), **wants)
+
+
+def test_a_path_that_never_arrives_is_unfoldable_and_says_so():
+    """A near-stadium about y turns back before pi, for good: done, with a mode and a sentence.
+
+    The boundary-value problem has its folds at 3.106268, 1.938953 and 2.355590.
+    """
+    ring = der.rectangle(0.46090256772792904, 0.3814496387454095, "y")
+    section = der.rectangular_section(3.3692299828162224, 0.0)
+    path = der.fold(der.Scene(ring, section, n_edges=128, stability=False, contacts=False))
+    assert (path.status, path.at_pi, path.gamma[-1]) == ("done", None, -math.pi)
+    assert (path.mode.foldable, path.mode.snapping) == (False, "snap-back")
+    assert "without arriving" in path.message
+    folds = [point.gamma for point in path.folds]
+    np.testing.assert_allclose(folds, [3.106268, 1.938953, 2.355590], atol=0.02)
+
+
+@pytest.mark.parametrize("stretch", ["inextensible", "finite"])
+def test_free_index_of_a_triangle(stretch):
+    """One way down with the grips removed, though stable in them: 120 degrees, r/a = 1/15, h/t = 4.
+
+    With finite stretch the ring settles a little when the grip lets its edge go.
+    """
+    ring = der.triangle(2 * math.pi / 3, 1 / 15)
+    scene = der.Scene(ring, der.rectangular_section(4.0), stretch=stretch, contacts=False)
+    at_pi = der.fold(scene).at_pi
+    assert (at_pi.index, at_pi.index_moment, at_pi.index_free) == (0, 0, 1)

@@ -12,7 +12,7 @@ from importlib.metadata import version
 import numpy as np
 
 from der.checks import checked_number, counts
-from der.record import AtPi, Mode, Path, Point, Timing, folding_mode
+from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode
 from der.ring import circle
 from der.scene import Scene
 from der.sections import section
@@ -27,7 +27,6 @@ from validation.unfolding import full_ring, turning
 TOLERANCE = 1e-8
 FINEST, COARSEST = 1e-11, 1e-3
 ACROSS = 0.4  # of the tolerance: errors across the path, which at equal gamma show larger
-_NEVER = "gamma turns back before gamma_max, and the path runs to -gamma_max without arriving"
 _FLAT = 1e-6  # out-of-plane extent of a folded ring, a
 HOW = (
     "change of the state, across the path, on a collocation mesh of half the intervals' length; "
@@ -107,7 +106,7 @@ def solve_visits(
         raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
     except KeyboardInterrupt:
         raise Interrupted(record("interrupted", "stopped by the user")) from None
-    message = _NEVER if visits[-1].at.gamma == -scene.gamma_max else ""
+    message = NEVER if visits[-1].at.gamma == -scene.gamma_max else ""
     return record("done", message), visits
 
 
@@ -173,7 +172,7 @@ def _record(
                 gamma[: k + 1], moments[: k + 1], before, at_pi, three_covered=covered
             )
             break
-    if message == _NEVER and float(gamma.max()) < math.pi:
+    if message == NEVER and float(gamma.max()) < math.pi:
         mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
     unknown = counts("index", [None] * len(visits))
     error = {
