@@ -56,9 +56,11 @@ def main(arguments: list[str] | None = None) -> None:
             text = " ".join(wrong.format_message().split())
         say(f"der: {text}")
         code = 2
-    except (typer.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt) as stopped:
+        if str(stopped):
+            say(f"der: {stopped}")
         code = 130
-    except OSError as wrong:  # a full disk behind standard output, for one
+    except (OSError, RuntimeError) as wrong:  # a full disk; workers that cannot work
         say(f"der: {wrong}")
         code = 3
     sys.exit(code or 0)
@@ -222,7 +224,7 @@ class PathOptions:
         str, typer.Option(help="arclength (through folds), angle or moment (with snaps).")
     ] = "arclength"
     unload: Annotated[
-        bool, typer.Option("--unload", help="Come back to 0, with --control angle.")
+        bool, typer.Option("--unload", help="Come back to 0, with --control angle or moment.")
     ] = False
     solver: Annotated[str, typer.Option(help="newton, or relaxation with --control angle.")] = (
         "newton"
@@ -463,32 +465,113 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
     return code
 
 
+HYSTERESIS = "hysteresis"  # a figure that the rod draws: loading and unloading of four rings
+
+
 @app.command()
 def figure(
     names: Annotated[
-        list[str], typer.Argument(metavar="NAME...", help="fig2b, fig3b, ..., or all.")
+        list[str],
+        typer.Argument(metavar="NAME...", help="fig2b, fig3b, ..., hysteresis; all; or diagrams."),
     ],
     out: Annotated[str, typer.Option(metavar="DIR", help="The folder to write to.")],
     workers: Annotated[
         int | None, typer.Option(parser=_whole, help="Processes; one a core if not given.")
     ] = None,
 ) -> None:
-    """Draw the paper's figures: PNG, and the data as CSV."""
+    """Draw the paper's figures: PNG, and the data as CSV. Diagrams are the phase diagrams."""
     with _options_named():
-        from validation.figures import FIGURES, Interrupted, draw
+        from validation.figures import DIAGRAMS, FIGURES, Interrupted, draw
 
-        chosen = list(FIGURES) if names == ["all"] else names
+        several = {"all": [*FIGURES, HYSTERESIS], "diagrams": list(DIAGRAMS)}
+        chosen = several.get(" ".join(names), names)
+        turned = HYSTERESIS in chosen
+        chosen = [name for name in chosen if name != HYSTERESIS]
         try:
             drawn = draw(chosen, out, workers=workers)
         except Interrupted as stopped:
             drawn, code = stopped.drawn, 130
         else:
             code = 3 if drawn.failed else 0
-    for file in (file for files in drawn.written.values() for file in files):
+    written = [file for files in drawn.written.values() for file in files]
+    if turned and code != 130:
+        from scenarios.hysteresis import draw as draw_loops
+
+        written += draw_loops(File(out))
+    for file in written:
         show(str(file))
     for name, reason in drawn.failed.items():
         say(f"der: {name} failed: {reason}")
     raise typer.Exit(code)
+
+
+PHASES = {  # the diagrams of each shape, that of a cube last
+    "ellipse": ("fig3a",),
+    "rectangle": ("fig5b", "fig5c", "fig5a"),
+    "triangle": ("fig8b", "fig8c", "fig8a"),
+    "circle": ("circle",),
+}
+
+
+@app.command()
+def phase(
+    shape: Annotated[
+        str,
+        typer.Argument(
+            metavar="SHAPE", help="ellipse, rectangle, triangle, circle; or a diagram: fig3a, ..."
+        ),
+    ],
+    out: Annotated[str, typer.Option(metavar="DIR", help="The folder to write to.")],
+    workers: Annotated[
+        int | None, typer.Option(parser=_whole, help="Processes; one a core if not given.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, instead.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the cases that the folder has.")
+    ] = False,
+    nu: Annotated[float, _number_option("Poisson's ratio.")] = NU,
+    span: Annotated[
+        list[str] | None,
+        typer.Option("--range", metavar="NAME=A:B", help="Of a parameter, such as b_over_a=0.7:1."),
+    ] = None,
+    finest: Annotated[
+        int | None, typer.Option(parser=_whole, help="Finest cells along a side, a power of two.")
+    ] = None,
+    check: Annotated[
+        str | None, typer.Option(help="'der': ask the rod about a sample of the cases.")
+    ] = None,
+    sample: Annotated[int, typer.Option(parser=_whole, help="Cases that --check asks about.")] = 40,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False,
+) -> None:
+    """Map how rings fold over profile and cross-section: cases, sharp boundaries, a picture."""
+    with _options_named():
+        from der.folding import fold as rod
+        from validation.phase import FAMILIES, run_phase
+
+        chosen = PHASES.get(shape, (shape,) if shape in FAMILIES else ())
+        if not chosen:
+            words = ", ".join(dict.fromkeys([*PHASES, *FAMILIES]))
+            raise typer.TyperException(f"SHAPE must be one of {words}, got {shape!r}")
+        if check not in (None, "der"):
+            raise ValueError(f"check must be 'der', got {check!r}")
+        for name in chosen:
+            text = run_phase(
+                name,
+                File(out) / name if len(chosen) > 1 else out,
+                workers=workers,
+                scheduler=scheduler,
+                resume=resume,
+                nu=nu,
+                ranges=tuple(span or ()),
+                check=rod if check else None,
+                sample=sample,
+                finest=finest,
+                quiet=quiet,
+            )
+            if not quiet:
+                show(text)
 
 
 @app.command()

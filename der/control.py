@@ -39,6 +39,7 @@ _SHARPEST = 0.4  # rad, a step that turns more is repeated shorter
 _WIDEST = 0.2  # bulge of a step; more is another part of the path
 _STEEP = 0.1  # of the first rate: below, a step is measured along the tangent
 _PAST = 1e-3  # rad: how far past a branch point the ring is let go
+_LEVEL = 1e-2  # of the rate of the moment where a branch returns to its symmetric path, GJ/a
 
 
 @dataclass(frozen=True)
@@ -151,6 +152,7 @@ def _march(
             length = 0.25 * step.length
             continue
         tally.steps += 1
+        found = [_named(piece, march, one) for one in found]
         lost = next((k for k, one in enumerate(found) if _is_lost(march, one)), None)
         yield from found[: None if lost is None else lost + 1]
         if lost is None:
@@ -259,6 +261,17 @@ def _own_class(piece: Sector) -> str:
     return next(iter(piece.classes))
 
 
+def _named(piece: Sector, march: March, one: Visit) -> Visit:
+    """A visit; a fold of a branch that returns to its symmetric path is a branch point.
+
+    There the moment is stationary, too: the branch goes back on itself, mirrored.
+    """
+    at = one.at
+    if march.control is Control.LOAD and one.kind == "fold" and abs(at.moment_rate) < _LEVEL:
+        return replace(one, kind="branch", details={"symmetry": _own_class(piece)})
+    return one
+
+
 def _is_lost(march: March, one: Visit) -> bool:
     return one.kind in (march.ends_at, "branch")
 
@@ -276,8 +289,30 @@ def _after(wanted: Wanted, march: March, step: Step, lost: Visit, every: int) ->
             f"({lost.details.get('symmetry')}) that breaks the symmetry of its {piece.name}; "
             f"the sector 'full' follows it"
         )
+    if abs(at.moment_rate) < _LEVEL and abs(at.tangent.load) < _LEVEL:
+        kept = _kept(wanted, march, step, at)
+        if kept is not None:
+            return kept
     before = _past(step, march.sense, at.state.load)
     return snapped(before, downhill(piece, before), gamma_lost=at.state.load)
+
+
+def _kept(wanted: Wanted, march: March, step: Step, at: Equilibrium) -> Visit | None:
+    """The minimum past the end of a branch, on its symmetric path: the ring just goes on.
+
+    None where there is none so close.
+    """
+    piece = step.piece
+    load = at.state.load + march.sense * _PAST
+    if (wanted.load_max - load) * march.sense < 0.0:
+        load = wanted.load_max
+    turned = moved(piece.held, at.state, heading(piece, load - at.state.load)).but(load=load)
+    along = heading(piece, march.sense)
+    found = equilibrium(piece.body, piece.held, turned, along=along, tolerance=wanted.tolerance)
+    step.tally.newton_iterations += found.iterations
+    if not found.converged or _own_index(piece, found) != 0:
+        return None
+    return visit(piece, wanted, found)
 
 
 def _past(step: Step, sense: float, load: float) -> Equilibrium:

@@ -45,7 +45,7 @@ def smooth(path: Path, height: Array, per: int = 16) -> Array:
     if path.numerics.get("control") == "moment" and np.array_equal(height, path.moment):
         for k in _snaps(path):
             inside = slice((k - 1) * per, k * per)
-            curve[inside, 0] = np.linspace(*values[k - 1 : k + 1, 0], per)
+            curve[inside, 0] = np.linspace(values[k - 1, 0], values[k, 0], per)
             curve[inside, 1] = height[k - 1]
     return curve
 

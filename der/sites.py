@@ -21,6 +21,7 @@ from der.outline import Array
 from der.ring import Ring
 
 CLOSE = 1e-12  # of the length: joints nearer to an end than this are that end
+FEW = 1e-3  # of a cell's share: a segment with less has no cell
 SAMPLES = 256  # of the density in a segment whose curvature varies
 
 
@@ -61,6 +62,14 @@ def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
     if n_cells < len(joints) - 1:
         joints = [begin, end]
     segments = [_Segment(ring, a, b) for a, b in pairwise(joints)]
+    # a straight that rounding leaves between two fillets deserves no cell of its own
+    least = FEW * sum(segment.weight for segment in segments) / n_cells
+    if any(segment.weight < least for segment in segments):
+        kept = [segment.end for segment in segments[:-1] if segment.weight >= least]
+        if segments[-1].weight < least:
+            kept = kept[:-1]
+        joints = [begin, *kept, end]
+        segments = [_Segment(ring, a, b) for a, b in pairwise(joints)]
     coarsest = n_cells
     while coarsest % 2 == 0 and coarsest // 2 >= 2 * len(segments):
         coarsest //= 2
@@ -76,6 +85,7 @@ class _Segment:
     """A piece of the ring with smooth natural curvature, and the density of frames on it."""
 
     def __init__(self, ring: Ring, begin: float, end: float) -> None:
+        self.end = end
         self.s = np.linspace(begin, end, SAMPLES + 1)
         middle = 0.5 * (self.s[1:] + self.s[:-1])
         density = np.abs(ring.curvature(middle)) + 4.0 * np.pi / ring.length

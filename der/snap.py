@@ -26,6 +26,9 @@ KICK = 0.05  # rad, root mean square: too short is slow, too long is steep in a 
 _TOLERANCE = 1e-6  # GJ/a, of a relaxation before Newton takes over; finer where it cannot
 _OFF = 1e-3  # rad, before a stop, from where a ring moves that does not rest on it
 _PRESSED = 1e-8  # GJ/a: a moment against a stop that is less than this is rounding
+_NEAR = 1e-2  # rad, before a stop: what rests there is looked for by Newton's method at once
+_MEETS = 1e-9  # rad, of a stop: nearer is on it
+_SOFT = 3  # modes nearest to zero that are looked at
 _FALLS = 8  # relaxations of one snap at most
 
 
@@ -50,12 +53,15 @@ def heading(piece: Sector, sense: float) -> Direction:
 
 
 def downhill(piece: Sector, before: Equilibrium) -> Direction:
-    """Softest mode of an unstable state at given load, of unit mass-weighted norm.
+    """Steepest way down of an unstable state at given load, of unit mass-weighted norm.
 
-    Of its two signs the one with the lower energy past a kick.
+    Next to a branch point of the full ring two modes of opposite stiffness lie near zero: of those
+    nearest, it is the one of the lowest eigenvalue. Of its two signs, that with the lower energy
+    past a kick.
     """
     modes = all_modes(piece.held)
-    _, (mode,) = softest_modes(piece.body, piece.held, modes, before.state)
+    stiffness, near = softest_modes(piece.body, piece.held, modes, before.state, _SOFT)
+    mode = near[int(np.argmin(stiffness))]
     norm = float(np.sqrt(np.sum(piece.body.length[:, None] * mode**2) / piece.body.length.sum()))
     ways = [heading(piece, 0.0)._replace(q=sign * mode / norm) for sign in (1.0, -1.0)]
     return min(ways, key=lambda way: _kicked(piece, before, way))
@@ -126,6 +132,24 @@ class _Drop:
         """Loads at which a motion under a dead moment ends: where the march ends, too."""
         end = self.wanted.load_max
         return (-np.inf, end) if self.sense > 0.0 else (end, np.inf)
+
+    def reaches(self, after: Equilibrium) -> bool:
+        """Whether a ring rests at its stop, or all but."""
+        return after.converged and self.sense * (after.state.load - self.wanted.load_max) > -_MEETS
+
+    def rests_near(self, after: Equilibrium) -> bool:
+        """Whether a ring rests under its dead moment so shortly before its stop that it is let be.
+
+        From a start further off, a motion to that state would run into the stop again.
+        """
+        modes = all_modes(self.piece.held)
+        return (
+            after.converged
+            and abs(after.state.load - self.wanted.load_max) < _NEAR
+            and not self.reaches(after)
+            and after.slope > 0.0
+            and index(self.piece.body, self.piece.held, modes, after.state) == 0
+        )
 
     def overruns(self, after: Equilibrium, moment: float) -> bool:
         """Whether a ring held at the stop would come back from it under a dead moment."""
@@ -204,12 +228,17 @@ def _fall(drop: _Drop, kick: Direction, moment: float | None) -> tuple[list[Rela
             continue
         after = drop.polished(start, moment)
         own = index(piece.body, piece.held, all_modes(piece.held), after.state)
-        if not after.converged:
+        if moment is not None and drop.reaches(after):
+            start, moment = drop.stopped(after.state), None
+        elif not after.converged:
             tolerance, reason = 1e-3 * tolerance, ADVICE[after.outcome]
         elif (
             own == 0 and moment is None and pressing is not None and drop.overruns(after, pressing)
         ):
             # the stop was only overrun: the ring comes back from it, to where the moment holds it
+            near = drop.polished(after.state, pressing)
+            if drop.rests_near(near):
+                return fallen, near
             start, moment = drop.stopped(after.state, short=_OFF), pressing
         elif own == 0:
             return fallen, after

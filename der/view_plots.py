@@ -38,6 +38,7 @@ STRETCHES: dict[bool | str | None, tuple[str, str, Any]] = {
     SNAP: ("the ring snaps", "#8a8a8a", (0, (1.2, 1.4))),
 }
 STATE: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.2, "color": INK}
+MANY = 250  # states; more would hide the line that they lie on
 MARKS = {  # label, marker, size
     "fold": ("fold", "D", 4.6),
     "limit": ("limit of M", "^", 5.6),
@@ -46,8 +47,10 @@ MARKS = {  # label, marker, size
     "contact": ("self-crossing", "x", 4.6),
 }
 
+UNITS = {"vertex_angle": "°"}  # of a ring's parameters
 LETTERS = "ABCDEF"  # one for each snapshot
 ACROSS = 240  # quadrilaterals along a ribbon
+CAPTION = 0.82  # room for what stands below a ribbon, of the row's height
 HALF_WIDTH = 0.085  # of a ribbon, over the flat ring's mean radius: exaggerated, to be seen
 FRONT, BACK, GRIP = (0.40, 0.67, 0.88), (0.96, 0.76, 0.46), (0.16, 0.16, 0.16)
 CAMERA = np.array([0.80, 0.45, 0.40])  # the ring lies in the plane of the last two axes
@@ -131,7 +134,7 @@ def save_plot(path: Path, file: FilePath) -> None:
 def _title(path: Path) -> str:
     """Ring, section, mesh and mode in one line."""
     ring = [
-        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}"
+        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}{UNITS.get(name, '')}"
         for name, value in path.ring.items()
         if isinstance(value, float) and (name, value) != ("natural_curvature", 1.0)
     ]
@@ -188,7 +191,9 @@ def _legend_handles(path: Path) -> list[Line2D]:
     for kind, (label, marker, size) in MARKS.items():
         if kind in kinds:
             handles.append(Line2D([], [], label=label, **_mark(marker, size)))
-    return [*handles, Line2D([], [], label="computed state", **STATE)]
+    if len(path) <= MANY:
+        handles.append(Line2D([], [], label="computed state", **STATE))
+    return handles
 
 
 def _mark(marker: str, size: float) -> dict[str, Any]:
@@ -210,7 +215,8 @@ def _draw_curve(panel: Axes, path: Path, height: Array, label: str) -> None:
     for stable, points in stretches(path, height):
         _, colour, style = STRETCHES[stable]
         panel.plot(*points.T, color=colour, linestyle=style, linewidth=1.5, zorder=2)
-    panel.plot(path.gamma / math.pi, height, zorder=3, **STATE)
+    if len(path) <= MANY:
+        panel.plot(path.gamma / math.pi, height, zorder=3, **STATE)
     for kind, (_, marker, size) in MARKS.items():
         at = [point.position for point in path.points if point.kind == kind]
         panel.plot(path.gamma[at] / math.pi, height[at], zorder=4, **_mark(marker, size))
@@ -276,7 +282,8 @@ def _draw_ribbons(row: Axes, shapes: Shapes, gamma: Array, chosen: list[int]) ->
     width = HALF_WIDTH * length / (2 * math.pi)
     ribbons = [_ribbon(x[k], frames[k, :, 0], width) for k in chosen]
     spans = np.array([np.ptp(corners.reshape(-1, 2), axis=0) for corners, _ in ribbons])
-    slot, tall = 1.12 * spans[:, 0].max(), 1.06 * spans[:, 1].max()
+    tall = 1.06 * spans[:, 1].max()
+    slot = max(1.12 * spans[:, 0].max(), CAPTION * tall)
     for i, (corners, colours) in enumerate(ribbons):
         flat = corners.reshape(-1, 2)
         centre = (flat.min(axis=0) + flat.max(axis=0)) / 2

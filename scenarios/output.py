@@ -9,20 +9,26 @@ from der.record import Path
 from der.summary import summary
 
 
-def write(path: Path, name: str) -> None:
-    """Write path.json, shapes.npz, path.png and path.rrd, and say so.
+def folder(name: str) -> File:
+    """The folder named on the command line, or out/NAME; made if it is not there."""
+    place = File(sys.argv[1] if len(sys.argv) > 1 else f"out/{name}")
+    place.mkdir(parents=True, exist_ok=True)
+    return place
 
-    They go to the folder named on the command line, or to out/NAME.
+
+def write(path: Path, name: str, *, stem: str = "path") -> None:
+    """Write STEM.json, shapes.npz, STEM.png and STEM.rrd, and say so.
+
+    They go to the `folder` of the scenario; the shapes are STEM.npz where STEM is not "path".
     """
     from der.view_plots import save_plot
     from der.view_rerun import save_recording
 
-    folder = File(sys.argv[1] if len(sys.argv) > 1 else f"out/{name}")
-    folder.mkdir(parents=True, exist_ok=True)
-    path.save(folder / "path.json")
+    place = folder(name)
+    path.save(place / f"{stem}.json")
     if path.shapes is not None:
-        path.shapes.save(folder / "shapes.npz")
-        save_recording(path, folder / "path.rrd")
-    save_plot(path, folder / "path.png")
+        path.shapes.save(place / ("shapes.npz" if stem == "path" else f"{stem}.npz"))
+        save_recording(path, place / f"{stem}.rrd")
+    save_plot(path, place / f"{stem}.png")
     print(summary(path))
-    print(f"written to {folder}")
+    print(f"written to {place}")

@@ -141,6 +141,37 @@ def test_the_full_ring_falls_off_a_branch_point(stability):
     assert (visits[-1].index is None) is not stability
 
 
+def test_the_full_ring_leaves_a_branch_point_along_its_mode_of_negative_stiffness():
+    """An ellipse, b/a = 0.54 about x, h/t = 1.33: an odd mode turns soft at gamma = 3.005.
+
+    Past it a mode of small positive stiffness is nearer to zero than the one that is a way down.
+    """
+    ring, section = der.ellipse(0.5425345743524903), der.rectangular_section(1.3259928102023317)
+    piece = sector(ring, section, 128, name="full")
+    visits = tuple(follow_angle(piece, Wanted(contacts=False, stability=False), Tally()))
+    (branch,), (landing,) = of_kind(visits, "branch"), of_kind(visits, "snap")
+    assert branch.at.state.load == pytest.approx(3.0052, abs=1e-3)
+    assert landing.details["energy_released"] == pytest.approx(0.554, abs=0.01)
+    assert index(piece.body, piece.held, all_modes(piece.held), landing.at.state) == 0
+
+
+def test_a_branch_that_returns_to_its_symmetric_path_is_followed_back():
+    """An ellipse, b/a = 0.74 about x, h/t = 1.36: past gamma = 3.089 its arms differ.
+
+    Coming back, the branch ends where it began: a branch point, no fold, and the ring goes on
+    without a snap, to the flat ring, as it came.
+    """
+    piece = sector(der.ellipse(0.7419), der.rectangular_section(1.36064), 64, name="full")
+    wanted = Wanted(contacts=False, stability=False)
+    visits = tuple(follow_angle(piece, wanted, Tally(), unload=True))
+    up, down = of_kind(visits, "branch")
+    assert down.at.state.load == pytest.approx(up.at.state.load, abs=1e-6)
+    assert down.at.moment == pytest.approx(up.at.moment, abs=1e-4)
+    assert len(of_kind(visits, "snap")) == 1
+    assert not of_kind(visits, "fold")
+    assert visits[-1].at.state.load == 0.0
+
+
 def test_a_march_does_not_start_from_a_saddle():
     """A state with a way down is refused, with a sentence."""
     between = next(visit for visit in path(1.6) if visit.index == (1, 0, 0))
@@ -192,6 +223,17 @@ def test_a_stop_that_is_only_overrun_does_not_hold_the_ring():
     assert abs(stopped.at.state.load - landing.at.state.load) < 1e-8
 
 
+def test_a_ring_that_rests_shortly_before_its_stop_is_found_there():
+    """A triangle whose state of rest lies 5e-4 rad before the stop that its motion runs into."""
+    ring = der.triangle(math.radians(75.075517148597), 0.052288041382129474)
+    piece = sector(ring, der.rectangular_section(1.1323602434456281), 128)
+    visits = tuple(follow_moment(piece, Wanted(contacts=False, stability=False), Tally()))
+    (landing,) = of_kind(visits, "snap")
+    assert 1e-4 < math.pi - landing.at.state.load < 1e-3
+    assert landing.details["moment_after"] == pytest.approx(landing.details["moment_before"])
+    assert loads(visits)[-1] == math.pi
+
+
 def test_the_dead_moment_only_grows():
     """Between snaps every state is at a higher moment than the last, at stable equilibrium."""
     _, visits = marched("moment", 1.6)
@@ -232,7 +274,7 @@ def test_the_folded_ring_pops_open_at_its_lower_limit():
 
 
 def test_a_ring_that_is_not_stable_folded_snaps_as_soon_as_it_is_let_go():
-    """At h/t = 2 dM/dgamma < 0 at pi: at M = 0 the ring falls from there to flat, all of U freed."""
+    """At h/t = 2 dM/dgamma < 0 at pi: at M = 0 the ring falls from there to flat."""
     piece, visits = marched("moment", 2.0, unload=True)
     folded, opened = of_kind(visits, "snap")
     assert folded.at.state.load == math.pi
@@ -264,10 +306,20 @@ def test_the_dead_moment_only_falls_on_the_way_back():
 
 def test_a_stop_at_zero_that_is_only_overrun_does_not_hold_the_ring():
     """A motion that would come to rest at gamma > 0 under M > 0 is no landing at 0."""
-    piece, visits = marched("moment", 1.0, unload=True)
+    _, visits = marched("moment", 1.0, unload=True)
     _, back = of_kind(visits, "snap")
     assert back.at.state.load > 0.1
     assert visits[-1].kind != "snap"
+
+
+def test_a_ring_that_comes_to_rest_at_its_stop_is_on_it():
+    """A triangle that is let go at M = 0 rests at gamma = 0 to rounding: it ends there exactly."""
+    ring = der.triangle(math.radians(75.459472779033), 0.18701066520775167)
+    piece = sector(ring, der.rectangular_section(3.6130411355236483), 128)
+    wanted = Wanted(contacts=False, stability=False)
+    *_, last = follow_moment(piece, wanted, Tally(), unload=True)
+    assert last.kind == "snap"
+    assert last.at.state.load == 0.0
 
 
 # --- relaxation alone ---------------------------------------------------------------------------

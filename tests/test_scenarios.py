@@ -35,3 +35,105 @@ def test_fold_by_dynamic_relaxation():
     np.testing.assert_allclose(path.energy[-1], 4 * np.pi * 0.7715693320, atol=1e-6)
     assert path.mode.foldable
     assert path.timing.newton_iterations == 0
+
+
+def test_fold_ellipse():
+    """About x it folds, about y it does not; limits of M by the boundary-value problem.
+
+    2.50010 and -0.26829, and M(pi) = 2.47484 about y: 128 edges are 2e-3, 4e-4 and 3e-3 off.
+    """
+    from scenarios.fold_ellipse import about_y, path
+
+    limits = [limit.moment for limit in path.limits]
+    np.testing.assert_allclose(limits, [2.50010419, -0.26829387], atol=3e-3)
+    assert path.mode.foldable
+    assert path.mode.stable
+    np.testing.assert_allclose(about_y.at_pi.moment, 2.474836026, atol=4e-3)
+    assert not about_y.mode.foldable
+
+
+def test_fold_rectangle():
+    """Folds of the boundary-value problem: 2.48830, 2.18039; 128 edges are 3.5e-3, 1.2e-3 off."""
+    from scenarios.fold_rectangle import first_fold, path, second_fold
+
+    np.testing.assert_allclose(first_fold.gamma, 2.488295037, atol=4e-3)
+    np.testing.assert_allclose(second_fold.gamma, 2.180386018, atol=2e-3)
+    assert path.mode.snapping == "snap-back"
+    assert path.mode.stable
+
+
+def test_fold_triangle():
+    """Folds of the boundary-value problem: 1.215578 and 0.400086; 128 edges, 1.5e-4, 6e-4 off."""
+    from scenarios.fold_triangle import first_fold, path, second_fold
+
+    np.testing.assert_allclose(first_fold.gamma, 1.215578365, atol=3e-4)
+    np.testing.assert_allclose(second_fold.gamma, 0.400085796, atol=1e-3)
+    assert path.mode.foldable
+
+
+def test_fold_by_dead_moment():
+    """At h/t = 4 limits of 1.4787 going up and -0.0160 coming down; 128 edges are 1e-3 off."""
+    from scenarios.fold_by_dead_moment import lower_limit, path, upper_limit
+
+    np.testing.assert_allclose(upper_limit.moment, 1.4787, atol=2e-3)
+    np.testing.assert_allclose(lower_limit.moment, -0.0160, atol=1e-3)
+    assert path.gamma[-1] == 0.0
+
+
+def test_hysteresis():
+    """Four rings up and down: two snaps each, at the folds of the boundary-value problem.
+
+    Energy conserved between snaps, so 4 times the loop integral of M dgamma is the sum of the
+    releases, to the quadrature's 1e-5; every landing is a state of the path of equilibria, to
+    1e-9 a (measured 2e-11): the first past both folds, the second before them.
+    """
+    from scenarios.hysteresis import loops
+
+    folds = {
+        "triangle_120": (2.754028657, 1.847603389),
+        "triangle_90": (1.215578365, 0.400085796),
+        "ellipse": (2.171790142, 2.046987264),
+        "rectangle": (2.488295037, 2.180386018),
+    }
+    released = {"triangle_120": 14.286572, "triangle_90": 3.319654, "ellipse": 0.582251}
+    released["rectangle"] = 2.443737
+    for name, loop in loops.items():
+        np.testing.assert_allclose([snap.gamma for snap in loop.snaps], folds[name], atol=4e-3)
+        np.testing.assert_allclose(sum(loop.released), released[name], atol=1e-5)
+        assert min(loop.released) > 0.0
+        assert abs(loop.work - sum(loop.released)) < 2e-5
+        assert max(landing.distance for landing in loop.landings) < 1e-9
+        assert [landing.folds for landing in loop.landings] == [2, 0]
+
+
+def test_picture_of_hysteresis(tmp_path):
+    """Equilibria, loading and unloading of every ring, M above U."""
+    from scenarios.hysteresis import loops
+    from scenarios.hysteresis_plot import figure_of_loops, save_loops
+
+    figure = figure_of_loops(list(loops.values()))
+    assert len(figure.axes) == 2 * len(loops)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "equilibria",
+        "loading",
+        "unloading",
+        "landing",
+    ]
+    save_loops(list(loops.values())[:1], tmp_path / "loop.png")
+    assert (tmp_path / "loop.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_three_ways_to_fall():
+    """From ten folds three ways land in one state, to 1e-8 rad in every edge: minima, index 0.
+
+    M of the circle's landing at h/t = 1.6 is 0.5271 at 64 edges, on the path of equilibria. Under
+    a dead moment inertia makes a difference: the ellipse passes gamma = 1.981, and folds.
+    """
+    from scenarios.three_ways_to_fall import falls, overshoot
+
+    assert len(falls) == 30
+    assert max(fall.apart for fall in falls) < 1e-8
+    assert all(fall.at.converged and set(fall.index) == {0} for fall in falls)
+    np.testing.assert_allclose(falls[0].moment, 0.527103, atol=1e-6)
+    np.testing.assert_allclose([overshoot["relax"], overshoot["flow"]], 1.980768, atol=1e-5)
+    assert overshoot["move"] == np.pi

@@ -153,6 +153,16 @@ def test_title_of_a_path_that_comes_back_says_so():
     assert figure_of_path(subject).texts[0].get_text().endswith("= π and back")
 
 
+def test_states_that_would_hide_their_line_are_left_out():
+    """Hundreds of dots are a thick line: they and their entry in the legend are not drawn."""
+    gamma = np.linspace(0.0, 3.0, 300)
+    unknown = counts([None] * 300)
+    many = {"gamma": gamma, "moment": np.sin(gamma), "energy": gamma**2}
+    subject = path(**many, index=unknown, index_moment=unknown, points=())
+    assert "computed state" not in legend(figure_of_path(subject))
+    assert "computed state" in legend(figure_of_path(path()))
+
+
 def test_path_without_index_says_that_stability_was_not_computed():
     figure = figure_of_path(path(index=counts([None] * 11)))
     assert legend(figure)[0] == UNKNOWN

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,8 @@ import numpy as np
 from der.unfinished import NotConverged
 from validation.cases import Case, Row, solve_case
 from validation.collocation import Failure, Solution, collocation
-from validation.conditions import KINDS, Lost, Value
+from validation.conditions import KINDS, Lost, Value, fresh
+from validation.edges import BoundaryPoint, Curve
 from validation.families import Family
 from validation.gauss import Array
 from validation.sectors import sector
@@ -31,41 +31,55 @@ from validation.solving import solve_visits
 from validation.tracing import At, corrected, trace
 
 SEED = 1e-9  # tolerance of the path that a condition starts from: it fixes the mesh carried along
-BESIDE = 1e-4  # of the diagram's side: where the labels beside a curve are asked for
+BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for
 BISECTED = 1e-6  # of the diagram's side
+SAME_CURVE = 1e-3  # of the diagram's side: above what chords leave of a curve
 REACH = 3.0  # gaps of the scan within which a crossing must find its curve
 EXCHANGE = "exchange"
 
 
-@dataclass(frozen=True)
-class BoundaryPoint:
-    """A point of a boundary."""
-
-    case: Case
-    gamma: float  # rad, of the state in which it happens
-    moment: float  # GJ/a
-    error: float  # estimated, in h/t
+Solve = Callable[[Sequence[Case]], Sequence[Row]]  # cases -> their rows, in the same order
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A boundary, in the order of the curve."""
-
-    kind: str  # "stability", "foldability", "snap-back" or "exchange"
-    twist_axis: str
-    points: tuple[BoundaryPoint, ...]
+def one_by_one(cases: Sequence[Case]) -> list[Row]:
+    """The rows of cases, solved in this process."""
+    return [solve_case(case) for case in cases]
 
 
-def boundaries(family: Family, rows: Sequence[Row]) -> list[Curve]:
+def boundaries(
+    family: Family,
+    rows: Sequence[Row],
+    *,
+    solve: Solve = one_by_one,
+    side_by_side: Callable[..., Iterable[list[Curve]]] | None = None,
+) -> list[Curve]:
     """Boundaries of a diagram from the rows of its scan; of a cube, slice by slice.
 
     Slices of a cube are those of the scan's coarsest values of the second coordinate.
+
+    Parameters
+    ----------
+    solve : how the cases beside curves and between neighbours are solved, many at a time; used
+        where the slices are not shared out.
+    side_by_side : such as the `map` of an executor, to share out slices where there are several.
     """
-    found: list[Curve] = []
-    for sheet in family.sheets:
-        for plane, placed in _slices(family, sheet, rows):
-            found += _Diagram(family, sheet, plane).curves(placed)
-    return found
+    slices = [
+        (sheet, plane, placed)
+        for sheet in family.sheets
+        for plane, placed in _slices(family, sheet, rows)
+    ]
+    if side_by_side is not None and len(slices) > 1:
+        found = side_by_side(_slice_curves, repeat(family), *zip(*slices, strict=True))
+    else:
+        found = (
+            _Diagram(family, sheet, plane, solve).curves(placed) for sheet, plane, placed in slices
+        )
+    return [curve for curves in found for curve in curves]
+
+
+def _slice_curves(family: Family, sheet: str, plane: float | None, placed: Placed) -> list[Curve]:
+    """The boundaries of one slice."""
+    return _Diagram(family, sheet, plane, one_by_one).curves(placed)
 
 
 Placed = dict[tuple[float, float], Row]  # rows by their place in the unit square
@@ -108,24 +122,26 @@ class _Crossing(NamedTuple):
     def middle(self) -> Array:
         return 0.5 * (np.array(self.a) + np.array(self.b))
 
+    def halved(self, place: tuple[float, float], row: Row) -> _Crossing:
+        """The half in which one case is foldable and the other is not."""
+        if row.foldable == self.first.foldable:
+            return self._replace(a=place, first=row)
+        return self._replace(b=place, second=row)
+
 
 class _Diagram:
     """One unit square of a family: its cases, and what happens between them."""
 
-    def __init__(self, family: Family, sheet: str, plane: float | None) -> None:
-        self.family, self.sheet, self.plane = family, sheet, plane
+    def __init__(self, family: Family, sheet: str, plane: float | None, solve: Solve) -> None:
+        self.family, self.sheet, self.plane, self.solve = family, sheet, plane, solve
         low, high = family.ranges[-1]
         self.height = high - low  # of h/t
-        self.row = lru_cache(maxsize=None)(self._row)
 
     def case(self, u: Array | tuple[float, float]) -> Case:
         """The case at a place, also a little outside of the square."""
         x, y = (min(max(float(part), 0.0), 1.0) for part in u)
         unit = (x, y) if self.plane is None else (x, self.plane, y)
         return self.family.case(self.sheet, unit)
-
-    def _row(self, u: tuple[float, float]) -> Row:
-        return solve_case(self.case(u))
 
     def curves(self, placed: Placed) -> list[Curve]:
         """All boundaries between the cases of a scan."""
@@ -139,24 +155,22 @@ class _Diagram:
         crossings = _crossings(placed)
         for crossing in crossings:  # one after the other: a curve explains many
             points = [] if explained(crossing) else self._traced(crossing)
-            if points:
+            if points and not _known(crossing.kind, points, traced):
                 traced.append((crossing.kind, points))
         exchanges: list[BoundaryPoint] = []
-        for crossing in crossings:
-            if crossing.kind != "foldability" or explained(crossing):
-                continue
+        left = [c for c in crossings if c.kind == "foldability" and not explained(c)]
+        for narrow in self._bisected(left):
             # so close to the boundary the fold that makes it, if one does, is at pi
-            narrow = self._bisected(crossing)
-            if narrow is None or explained(narrow):
+            if explained(narrow):
                 continue
-            if points := self._traced(narrow):
+            points = self._traced(narrow)
+            if points and not _known(narrow.kind, points, traced):
                 traced.append((narrow.kind, points))
-            else:
+            elif not points:
                 exchanges.append(self._exchange(narrow))
         curves = [
             Curve(kind, self.sheet, tuple(self._point(kind, at) for at in piece))
-            for kind, points in traced
-            for piece in self._kept(kind, points)
+            for kind, piece in self._kept(traced)
         ]
         return curves + [
             Curve(EXCHANGE, self.sheet, chain) for chain in self._chains(exchanges) if chain
@@ -176,7 +190,9 @@ class _Diagram:
                         near=REACH * crossing.gap,
                     )
                     if _apart(near.u, crossing) < REACH * crossing.gap:
-                        return trace(self._condition(crossing.kind), near.u, near.state)
+                        return trace(
+                            self._condition(crossing.kind), near.u, near.state, fresh=fresh
+                        )
                 except Lost:
                     continue
         return []
@@ -209,47 +225,45 @@ class _Diagram:
             return math.inf
         return self.height * (at.distance + abs(change) / float(np.linalg.norm(at.gradient)))
 
-    def _kept(self, kind: str, points: list[At[Value]]) -> Iterator[list[At[Value]]]:
-        """Pieces of a curve on whose two sides the modes differ by its kind."""
-        piece: list[At[Value]] = []
-        for before, at, after in zip(
-            [points[0], *points[:-1]], points, [*points[1:], points[-1]], strict=True
-        ):
-            if self._bounds(kind, at.u, after.u - before.u):
-                piece.append(at)
-                continue
-            if len(piece) > 1:
-                yield piece
-            piece = []
-        if len(piece) > 1:
-            yield piece
-
-    def _bounds(self, kind: str, u: Array, way: Array) -> bool:
-        """Whether the modes beside a curve differ by what it bounds."""
-        normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
-        sides = []
-        for sign in (1.0, -1.0):
-            beside = np.clip(u + sign * BESIDE * normal, 0.0, 1.0)
-            sides.append(self.row((float(beside[0]), float(beside[1]))))
-        return kind in _differences(*sides)
+    def _kept(self, traced: list[tuple[str, list[At[Value]]]]) -> list[tuple[str, list[At[Value]]]]:
+        """Pieces of curves on whose two sides the modes differ by their kind, each once."""
+        beside = [
+            self.case(place)
+            for _, points in traced
+            for k in range(len(points))
+            for place in _beside(points, k)
+        ]
+        rows = iter(self.solve(beside))
+        pieces: list[tuple[str, list[At[Value]]]] = []
+        for kind, points in traced:
+            piece: list[At[Value]] = []
+            for at in [*points, None]:
+                if at is not None and kind in _differences(next(rows), next(rows)):
+                    piece.append(at)
+                    continue
+                if len(piece) > 1:
+                    pieces.append((kind, piece))
+                piece = []
+        pieces.sort(key=lambda item: -len(item[1]))
+        kept: list[tuple[str, list[At[Value]]]] = []
+        for kind, piece in pieces:
+            if not _known(kind, piece, kept):
+                kept.append((kind, piece))
+        return kept
 
     # --- what only the label tells ---
 
-    def _bisected(self, crossing: _Crossing) -> _Crossing | None:
-        """Two cases between the two, close together, one of them foldable; None if one fails."""
-        a, b = np.array(crossing.a), np.array(crossing.b)
-        first, second = crossing.first, crossing.second
-        while np.linalg.norm(b - a) > BISECTED:
-            middle = 0.5 * (a + b)
-            row = solve_case(self.case(middle))
-            if not row.ok:
-                return None
-            if row.foldable == first.foldable:
-                a, first = middle, row
-            else:
-                b, second = middle, row
-        one, other = ((float(u[0]), float(u[1])) for u in (a, b))
-        return _Crossing(crossing.kind, one, other, first, second)
+    def _bisected(self, crossings: list[_Crossing]) -> list[_Crossing]:
+        """Two cases between each two, close together, one of them foldable; all in lockstep."""
+        while crossings and max(crossing.gap for crossing in crossings) > BISECTED:
+            middles = [crossing.middle for crossing in crossings]
+            rows = self.solve([self.case(middle) for middle in middles])
+            crossings = [
+                crossing.halved((float(middle[0]), float(middle[1])), row)
+                for crossing, middle, row in zip(crossings, middles, rows, strict=True)
+                if row.ok
+            ]
+        return crossings
 
     def _exchange(self, narrow: _Crossing) -> BoundaryPoint:
         """The place where paths exchange, with the last fold before pi on the foldable side."""
@@ -312,15 +326,34 @@ def _differences(a: Row, b: Row) -> list[str]:
     return kinds + (["snap-back"] if a.snapping != b.snapping else [])
 
 
-def _passes(points: Iterable[At[Value]], crossing: _Crossing) -> bool:
+def _beside(points: list[At[Value]], k: int) -> list[Array]:
+    """Two places, one on each side of a curve at its k-th point."""
+    way = points[min(k + 1, len(points) - 1)].u - points[max(k - 1, 0)].u
+    normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
+    return [np.clip(points[k].u + sign * BESIDE * normal, 0.0, 1.0) for sign in (1.0, -1.0)]
+
+
+def _known(kind: str, points: list[At[Value]], traced: list[tuple[str, list[At[Value]]]]) -> bool:
+    """Whether a curve has been followed before: its middle lies on one of the same kind."""
+    middle = points[len(points) // 2].u
+    return any(
+        other == kind and _distance(middle, old) < SAME_CURVE for other, old in traced if old
+    )
+
+
+def _passes(points: Sequence[At[Value]], crossing: _Crossing) -> bool:
     """Whether a curve passes between two neighbouring cases, or close by."""
+    return _distance(crossing.middle, points) < max(0.75 * crossing.gap, SAME_CURVE)
+
+
+def _distance(place: Array, points: Sequence[At[Value]]) -> float:
+    """Distance of a place from the polygon through the points of a curve."""
     u = np.array([at.u for at in points])
-    a, b = u[:-1], u[1:]
-    way = b - a
+    a, way = u[:-1], np.diff(u, axis=0)
     square = np.maximum((way**2).sum(axis=1), 1e-300)
-    along = np.clip(((crossing.middle - a) * way).sum(axis=1) / square, 0.0, 1.0)
-    apart = np.linalg.norm(a + along[:, None] * way - crossing.middle, axis=1)
-    return bool(apart.min(initial=math.inf) < max(0.75 * crossing.gap, 1e-4))
+    along = np.clip(((place - a) * way).sum(axis=1) / square, 0.0, 1.0)
+    apart = np.linalg.norm(a + along[:, None] * way - place, axis=1)
+    return float(apart.min(initial=math.inf))
 
 
 def _apart(u: Array, crossing: _Crossing) -> float:

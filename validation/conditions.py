@@ -20,10 +20,10 @@ import numpy as np
 
 from der.scene import Scene
 from validation.collocation import Collocation, Direction, Failure, Solution, collocation
-from validation.continuation import dot
-from validation.meshes import mesh_at
+from validation.meshes import fitted, mesh_at
 from validation.sectors import sector
 
+ACCURATE = 1e-9  # of gamma/pi and M: beyond, a mesh is fitted again
 TIGHT = 1e-11  # increments of a solution from which a condition is judged
 PROBE = 1e-3  # of s: first step of a secant
 SMALL = 1e-10  # of s: a secant step that has converged
@@ -70,9 +70,21 @@ def carried(scene: Scene, seed: Value) -> tuple[Collocation, Solution]:
     return system, found
 
 
+def fresh(seed: Value) -> Value:
+    """The same solution on a mesh fitted to it, where its own has become too coarse."""
+    system, at = seed.system, seed.at
+    error = system.error(at)
+    size = max(error.gamma / math.pi, error.moment / max(abs(at.moment), 1.0))
+    if size <= ACCURATE:
+        return seed
+    factor = min((size / (0.1 * ACCURATE)) ** 0.125, 2.0)
+    n = math.ceil(factor * len(at.mesh.h))
+    found = system.on(fitted(at.mesh, at.nodes[:-1], at.frames, n), at)
+    return seed if isinstance(found, Failure) else seed._replace(at=found)
+
+
 def stability(scene: Scene, seed: Value) -> Value:
     """DM/ds at gamma = pi; the seed is a folded state."""
-    system = collocation(sector(scene))
     system, near = carried(scene, seed)
     found = system.solved(
         near.mesh,
@@ -150,5 +162,3 @@ KINDS = {
         ("snap-back", snap_back),
     )
 }
-
-__all__ = ["KINDS", "Kind", "Lost", "Value", "carried", "dot"]

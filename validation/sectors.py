@@ -17,6 +17,7 @@ With F . E2 = F . E3 = 0 the force of a quarter is f E1 everywhere.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from der.ring import Ring
 from der.scene import Scene
 from validation.corrector import Piece
 from validation.gauss import Array
+
+CLOSE = 1e-12  # of the ring's length: joints nearer to each other than this are one
 
 # p -> (m0, F)
 QUARTER = np.zeros((6, 4))
@@ -82,7 +85,10 @@ def sector(scene: Scene) -> Sector:
         )
     begin = 0.25 * ring.length if quarter else 0.0
     length = 0.5 * ring.length - begin
-    inside = [s - begin for s in ring.kinks if begin + 1e-12 < s < begin + length - 1e-12]
+    margin = CLOSE * ring.length
+    inside = [s - begin for s in ring.kinks if begin + margin < s < begin + length - margin]
+    # a straight that rounding leaves between two fillets is none
+    inside = [a for a, b in pairwise([*inside, length]) if b - a > margin]
     ends = np.array([begin, begin + length])
     half = 0.5 * (ring.angle(ends) - 0.5 * np.pi)
     zero = np.zeros(2)

@@ -74,24 +74,33 @@ def _gradient(f: Function[T], u: Array, value: float, state: T) -> Array:
     return out
 
 
-def trace(f: Function[T], u: Array, state: T) -> list[At[T]]:
+def trace(
+    f: Function[T], u: Array, state: T, *, fresh: Callable[[T], T] = lambda state: state
+) -> list[At[T]]:
     """The curve through (or near) ``u``, from one end to the other.
+
+    Parameters
+    ----------
+    f : value and state at a place, from a state nearby.
+    fresh : called with the state of every point, may give back a better one to go on with.
 
     Raises
     ------
     Lost
         Where there is no point of the curve near ``u``.
     """
-    first = corrected(f, np.asarray(u, dtype=float), state)
+    first = corrected(f, np.asarray(u, dtype=float), fresh(state))
     gradient = first.gradient
-    ahead, closed = _half(f, first, np.array([-gradient[1], gradient[0]]))
+    ahead, closed = _half(f, fresh, first, np.array([-gradient[1], gradient[0]]))
     if closed:
         return [first, *ahead]
-    behind, _ = _half(f, first, np.array([gradient[1], -gradient[0]]))
+    behind, _ = _half(f, fresh, first, np.array([gradient[1], -gradient[0]]))
     return [*reversed(behind), first, *ahead]
 
 
-def _half(f: Function[T], first: At[T], direction: Array) -> tuple[list[At[T]], bool]:
+def _half(
+    f: Function[T], fresh: Callable[[T], T], first: At[T], direction: Array
+) -> tuple[list[At[T]], bool]:
     """The curve from a point on in one direction, and whether it came back to it."""
     found: list[At[T]] = []
     here, tangent = first, direction / np.linalg.norm(direction)
@@ -118,7 +127,7 @@ def _half(f: Function[T], first: At[T], direction: Array) -> tuple[list[At[T]], 
         found.append(new)
         if len(found) > 3 and np.linalg.norm(new.u - first.u) < 0.75 * step:
             return found, True
-        here, tangent = new, way
+        here, tangent = new._replace(state=fresh(new.state)), way
         step = min(step * (1.3 if angle < 0.5 * SHARPEST else 0.8), LARGEST)
     return found, False
 

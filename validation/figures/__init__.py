@@ -16,7 +16,7 @@ from der.files import FilePath
 from validation.figures.drawing import Drawn, Interrupted
 from validation.figures.drawing import draw as _draw
 
-__all__ = ["FIGURES", "Drawn", "Interrupted", "draw"]
+__all__ = ["DIAGRAMS", "FIGURES", "Drawn", "Interrupted", "draw"]
 
 Draw: TypeAlias = Callable[[FilePath], list[File]]
 
@@ -28,7 +28,7 @@ def draw(names: list[str] | tuple[str, ...], folder: FilePath, workers: int | No
 
     Parameters
     ----------
-    names : of FIGURES
+    names : of FIGURES, and of DIAGRAMS, which take a minute each, those of cubes ten
     folder : where the files go; made if it is not there
     workers : how many figures at a time; None: as many as there are cores
 
@@ -46,9 +46,21 @@ def draw(names: list[str] | tuple[str, ...], folder: FilePath, workers: int | No
         At Ctrl-C; has what was finished until then. No half-written file is left.
     """
     for name in names:
-        if name not in FIGURES:
-            raise ValueError(f"name must be one of {', '.join(FIGURES)}, got {name!r}")
-    return _draw({name: FIGURES[name] for name in names}, folder, workers)
+        if name not in FIGURES and name not in DIAGRAMS:
+            words = ", ".join([*FIGURES, *DIAGRAMS])
+            raise ValueError(f"name must be one of {words}, got {name!r}")
+    drawn = _draw({name: FIGURES[name] for name in names if name in FIGURES}, folder, workers)
+    diagrams = {
+        name: _diagram(name, File(folder) / name, workers) for name in names if name in DIAGRAMS
+    }
+    return Drawn({**drawn.written, **diagrams}, drawn.failed)
+
+
+def _diagram(name: str, folder: File, workers: int | None) -> list[File]:
+    """A phase diagram, in a folder of its own; it goes on with the cases that are there."""
+    from validation.phase import phase
+
+    return list(phase(name, folder, workers=workers, resume=True).files)
 
 
 def _curves(name: str, folder: FilePath) -> list[File]:
@@ -114,3 +126,4 @@ _HOME: dict[str, Callable[[str, FilePath], list[File]]] = {
     "figD3": _profiles,
 }
 FIGURES: dict[str, Draw] = {name: partial(home, name) for name, home in _HOME.items()}
+DIAGRAMS = ("fig3a", "fig5a", "fig5b", "fig5c", "fig8a", "fig8b", "fig8c")

@@ -1,0 +1,24 @@
+"""Fold an ellipse, b/a = 0.6, h/t = 4: about its short axis it folds, about its long one not.
+
+Twisted by grips at the ends of its short axis ("about x") the ring turns into three loops and stays
+so; by grips at the ends of the long axis it is still full of moment at gamma = pi. The ring and the
+folded shape are the same: only the way there differs (paper, Fig. 4).
+
+    python -m scenarios.fold_ellipse [DIR]
+
+writes path.* and about_y.* (json, npz, png, rrd) to DIR (default: out/fold_ellipse).
+"""
+
+from __future__ import annotations
+
+import der
+from scenarios.output import write
+
+SECTION = der.rectangular_section(h_over_t=4.0)
+
+path = der.fold(der.Scene(der.ellipse(0.6), SECTION, n_edges=128, shapes=True, modes=True))
+about_y = der.fold(der.Scene(der.ellipse(0.6, "y"), SECTION, n_edges=128, shapes=True, modes=True))
+
+if __name__ == "__main__":
+    write(path, "fold_ellipse")
+    write(about_y, "fold_ellipse", stem="about_y")

@@ -1,0 +1,168 @@
+"""Does it matter how a ring falls? Relaxed, in a viscous fluid, and swinging: from ten folds.
+
+At a fold the ring loses its stability and falls to another equilibrium. Which one might depend on
+the motion. Here each fall is computed in three ways, all begun by the same kick along the fold's
+softest mode:
+
+    relax   dynamic relaxation, stopped at every peak of kinetic energy (what `der.fold` uses)
+    flow    overdamped: down the gradient, by implicit steps in time
+    move    inertial: lightly damped, the ring swings dozens of times before it rests
+
+With the grips held all three land in one state, on the path of equilibria, and a minimum in three
+dimensions. Under a dead moment they need not: an ellipse that swings passes over the state in which
+it would come to rest without inertia (`overshoot`).
+
+    python -m scenarios.three_ways_to_fall [DIR]
+
+writes falls.txt, the table below, to DIR (default: out/three_ways_to_fall).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+import der
+from der.control import follow_angle, follow_moment
+from der.equilibrium import Control, Direction, Equilibrium, equilibrium
+from der.falls import Fallen
+from der.frames import rotation_vector
+from der.gradient_flow import flow
+from der.motion import move
+from der.relaxation import Relaxed, Rest, relax
+from der.sector import Sector, sector
+from der.snap import KICK, Landing
+from der.special import Wanted, visit
+from der.step import Tally
+from scenarios.output import folder
+from scenarios.snapping_rings import SNAPPING
+
+EDGES = 64
+RINGS = {"circle": (der.circle(), 1.6), **SNAPPING}
+WAYS: dict[str, Callable[..., Relaxed | Fallen]] = {"relax": relax, "flow": flow, "move": move}
+WANTED = Wanted(contacts=False)
+
+
+@dataclass(frozen=True)
+class Fall:
+    """One fall and where it ended."""
+
+    ring: str
+    gamma: float  # of the fold, rad
+    way: str
+    end: Rest
+    at: Equilibrium  # after Newton's method
+    moment: float  # there, of one arm, GJ/a
+    energy: float  # there, of the full ring, GJ/a
+    index: tuple[int | None, ...]  # there, by symmetry class
+    apart: float  # from where the relaxed ring lands: largest rotation of an edge, rad
+    cost: str
+    seconds: float
+
+
+def _kick(at: Equilibrium, *, load: bool) -> Direction:
+    """The displacement with which a fall begins."""
+    t = at.tangent
+    return Direction(KICK * t.q, 0.0 * t.force, KICK * t.load if load else 0.0)
+
+
+def _falls(name: str) -> Iterator[Fall]:
+    """Falls from both folds of a ring that is loaded and unloaded by the angle."""
+    ring, h_over_t = RINGS[name]
+    piece = sector(ring, der.rectangular_section(h_over_t), EDGES)
+    for before in follow_angle(piece, WANTED, Tally(), unload=True):
+        if before.kind != "fold":
+            continue
+        first: Equilibrium | None = None
+        for way, fall in WAYS.items():
+            started = time.perf_counter()
+            kick = _kick(before.at, load=False)
+            found = fall(piece.body, piece.held, before.at.state, kick=kick, tolerance=1e-6)
+            seconds = time.perf_counter() - started
+            at = equilibrium(piece.body, piece.held, found.state)
+            first = at if first is None else first
+            yield Fall(
+                name,
+                before.at.state.load,
+                way,
+                found.outcome,
+                at,
+                piece.moment(at.moment),
+                piece.copies * at.energy,
+                visit(piece, WANTED, at).index or (),
+                float(np.abs(rotation_vector(first.state.quat, at.state.quat)).max()),
+                _cost(found),
+                seconds,
+            )
+
+
+def _cost(found: Relaxed | Fallen) -> str:
+    if isinstance(found, Fallen):
+        return f"{found.steps} steps, {found.factorisations} factorisations"
+    return f"{found.evaluations} gradients"
+
+
+def _overshoot() -> dict[str, float]:
+    """Where an ellipse goes from its first limit of the dead moment: gamma by way of falling.
+
+    b/a = 0.85 about y, h/t = 4. Those that pass a stop at pi end at the folded ring, whose own
+    moment, 0, is below the dead one: it stays there.
+    """
+    ring, h_over_t = RINGS["ellipse"]
+    piece = sector(ring, der.rectangular_section(h_over_t), EDGES)
+    visits = list(follow_moment(piece, WANTED, Tally()))
+    landing = next(k for k, one in enumerate(visits) if isinstance(one, Landing))
+    before = visits[landing - 1].at
+    ends = {"relax": visits[landing].at.state.load}
+    for way in ("flow", "move"):
+        found = WAYS[way](
+            piece.body,
+            piece.held,
+            before.state,
+            kick=_kick(before, load=True),
+            moment=before.moment,
+            stops=(-np.inf, math.pi),
+            tolerance=1e-6,
+        )
+        ends[way] = math.pi if found.outcome is Rest.AT_STOP else _rest(piece, before, found)
+    return ends
+
+
+def _rest(piece: Sector, before: Equilibrium, found: Relaxed | Fallen) -> float:
+    """Gamma at rest under the moment of the state that was left."""
+    at = equilibrium(
+        piece.body, piece.held, found.state, control=Control.MOMENT, moment=before.moment
+    )
+    return at.state.load
+
+
+falls = [fall for name in RINGS for fall in _falls(name)]
+overshoot = _overshoot()
+
+
+def table() -> str:
+    """Where the rings land, and what it costs to compute."""
+    rows = [
+        f"{'':14}{'from gamma':>11}  {'way':6}{'M':>11}{'U':>12}{'index':>7}{'apart':>9}"
+        f"{'time':>9}  cost"
+    ]
+    for fall in falls:
+        index = sum(count or 0 for count in fall.index)
+        rows.append(
+            f"{fall.ring:14}{fall.gamma:11.6f}  {fall.way:6}{fall.moment:11.6f}{fall.energy:12.6f}"
+            f"{index:7}{fall.apart:9.0e}{1e3 * fall.seconds:6.0f} ms  {fall.cost}"
+        )
+    ends = ", ".join(f"{way} {gamma:.4f}" for way, gamma in overshoot.items())
+    rows.append(f"ellipse under the dead moment of its first limit, gamma where it ends: {ends}")
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    place = folder("three_ways_to_fall") / "falls.txt"
+    place.write_text(table() + "\n")
+    print(table())
+    print(f"written to {place}")

@@ -1,0 +1,323 @@
+"""Phase diagrams of folding modes: scanned, their boundaries followed, drawn and tabled.
+
+    diagram = phase("fig3a", "out/fig3a", resume=True)
+
+New Python processes are started, so a script calls this under ``if __name__ == "__main__"``.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import time
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as File
+
+import numpy as np
+
+from der.files import FilePath, write_whole
+from validation.boundaries import boundaries
+from validation.cases import LABELS, PARAMETERS, Case, Row
+from validation.edges import Curve, scanned_boundaries
+from validation.families import FAMILIES, Family, family
+from validation.gauss import Array
+from validation.rod_check import Compared, Fold, rod_check, table
+from validation.scan import Scan, scan, solve_all
+from validation.store import Store
+from validation.workers import Workers
+from validation.workers import workers as started
+
+__all__ = ["FAMILIES", "Diagram", "phase", "run_phase"]
+
+STORE = "cases.jsonl"
+SAMPLE = 40
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """A phase diagram.
+
+    Attributes
+    ----------
+    scan : its cases; `scan.sorted_rows` has each once
+    curves : boundaries between folding modes
+    compared : cases by the rod, too, where that was asked for
+    files : what was written
+    seconds : what it took: the scan, the boundaries, the check
+    """
+
+    scan: Scan
+    curves: tuple[Curve, ...]
+    compared: tuple[Compared, ...]
+    files: tuple[File, ...]
+    seconds: tuple[float, float, float]
+
+    @property
+    def family(self) -> Family:
+        """What was scanned."""
+        return self.scan.family
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """How every case folds."""
+        return self.scan.sorted_rows
+
+
+def phase(
+    name: str,
+    folder: FilePath,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    nu: float = 0.3,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    check: Fold | None = None,
+    sample: int = SAMPLE,
+    finest: int | None = None,
+    progress: bool = True,
+) -> Diagram:
+    """The phase diagram of a family of rings, written to a folder.
+
+    Every finished case is in `cases.jsonl` at once, so that a run that ends in whatever way, and is
+    resumed, loses none but those in flight. Afterwards `cases.csv`, `boundaries.csv`, NAME.png, and
+    `check.csv` are written.
+
+    Parameters
+    ----------
+    name : of FAMILIES
+    folder : where the files go; made if it is not there
+    workers : processes, None: one a core
+    scheduler : address of a Dask scheduler whose workers are used instead
+    resume : go on with the cases that the folder has
+    nu : Poisson's ratio
+    ranges : first and last value of parameters in place of the family's own, by name
+    check : a solver such as `der.fold`, asked about a sample of the cases
+    sample : how many
+    finest : intervals along each parameter at the finest level, a power of two
+    progress : whether to show a bar, on a terminal
+
+    Raises
+    ------
+    ValueError
+        For an argument that is not allowed, by name; a folder with cases, unless it is to resume.
+    Interrupted
+        At Ctrl-C. What was finished is kept.
+    OSError
+        On a full disk. What was finished is kept.
+    RuntimeError
+        If workers cannot work.
+    """
+    wanted = family(name, nu=nu, ranges=ranges, finest=finest)
+    if isinstance(sample, bool) or not isinstance(sample, int) or sample < 1:
+        raise ValueError(f"sample must be a whole number from 1, got {sample!r}")
+    folder = _made(folder)
+    clock = [time.perf_counter()]
+    with Store(folder / STORE) as store, started(workers, scheduler) as crew:
+        if len(store) and not resume:
+            raise ValueError(
+                f"resume must be asked for in a folder that has cases, {folder} has {len(store)}"
+            )
+        found = scan(wanted, store, crew, progress=progress)
+        clock.append(time.perf_counter())
+        cases = _write(folder / "cases.csv", CASE_COLUMNS, map(_case_cells, found.sorted_rows))
+        curves = tuple(_boundaries(found, store, crew))
+    clock.append(time.perf_counter())
+    compared = () if check is None else rod_check(found, check, sample)
+    clock.append(time.perf_counter())
+    files = (cases, *_written(folder, found, curves, compared))
+    seconds = (clock[1] - clock[0], clock[2] - clock[1], clock[3] - clock[2])
+    return Diagram(found, curves, compared, files, seconds)
+
+
+def run_phase(
+    name: str,
+    folder: FilePath,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    nu: float = 0.3,
+    ranges: Sequence[str] = (),
+    check: Fold | None = None,
+    sample: int = SAMPLE,
+    finest: int | None = None,
+    quiet: bool = False,
+) -> str:
+    """`phase` for the command line: ranges as "b_over_a=0.7:1"; returns what there is to say."""
+    diagram = phase(
+        name,
+        folder,
+        workers=workers,
+        scheduler=scheduler,
+        resume=resume,
+        nu=nu,
+        ranges=dict(map(_range, ranges)),
+        check=check,
+        sample=sample,
+        finest=finest,
+        progress=not quiet,
+    )
+    return summary(diagram)
+
+
+def summary(diagram: Diagram) -> str:
+    """Cases by label, what it took, and what was written, in a few lines."""
+    rows = diagram.rows
+    count = Counter(row.label for row in rows)
+    taken = "s, ".join(
+        f"{words} {seconds:.1f}"
+        for words, seconds in zip(("scan", "boundaries", "check"), diagram.seconds, strict=True)
+    )
+    lines = [
+        f"{diagram.family.name}: {len(rows)} cases, {diagram.scan.solved} solved now ({taken} s)"
+    ]
+    lines += [f"  {count[label]:6d}  {label}" for label in LABELS if count[label]]
+    if bad := [row for row in rows if not row.ok]:
+        lines.append(f"  {len(bad):6d}  failed, the first: {bad[0].message}")
+    kinds = Counter(curve.kind for curve in diagram.curves)
+    lines.append("boundaries: " + ", ".join(f"{n} {kind}" for kind, n in kinds.items()))
+    if left := unexplained(diagram.scan, diagram.curves):
+        lines.append(f"  {left} edges of the scan have no boundary within 1.5 cells")
+    if diagram.compared:
+        lines.append(table(diagram.compared))
+    return "\n".join([*lines, *map(str, diagram.files)])
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    """The name and the two numbers of "b_over_a=0.7:1"."""
+    name, _, values = text.partition("=")
+    try:
+        low, high = map(float, values.split(":"))
+    except ValueError:
+        raise ValueError(f"ranges must be like b_over_a=0.7:1, got {text!r}") from None
+    return name.strip().replace("-", "_"), (low, high)
+
+
+def _made(folder: FilePath) -> File:
+    """The folder, made unless it is there."""
+    folder = File(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise ValueError(
+            f"folder must be one that can be made, got {str(folder)!r}: {reason}"
+        ) from problem
+    return folder
+
+
+def _boundaries(found: Scan, store: Store, crew: Workers) -> list[Curve]:
+    """Boundaries followed in two parameters; what is solved for on the way is kept, too."""
+
+    def solve(cases: Sequence[Case]) -> list[Row]:
+        solve_all(
+            [case for case in dict.fromkeys(cases) if case.key not in store.rows], store, crew
+        )
+        return [store.rows[case.key] for case in cases]
+
+    return boundaries(found.family, found.sorted_rows, solve=solve, side_by_side=crew.executor.map)
+
+
+def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
+    """How many edges of the scan's finest cells have no boundary within one and a half cells."""
+    family = found.family
+    lines: dict[str, list[Array]] = {}
+    for curve in curves:
+        places = [family.unit(point.case) for point in curve.points]
+        known = np.array([place for place in places if place is not None])
+        if len(known):
+            lines.setdefault(curve.twist_axis, []).append(known)
+    return sum(
+        _distance(np.array(place), lines.get(curve.twist_axis, [])) > 1.5 / family.finest
+        for curve in scanned_boundaries(found)
+        for point in curve.points
+        if (place := family.unit(point.case)) is not None
+    )
+
+
+def _distance(place: Array, lines: Iterable[Array]) -> float:
+    """Distance of a place from the nearest of some polygons."""
+    best = math.inf
+    for line in lines:
+        a, way = line[:-1], np.diff(line, axis=0)
+        if not len(way):
+            a, way = line, np.zeros_like(line)
+        square = np.maximum((way**2).sum(axis=1), 1e-300)
+        along = np.clip(((place - a) * way).sum(axis=1) / square, 0.0, 1.0)
+        apart = np.linalg.norm(a + along[:, None] * way - place, axis=1)
+        best = min(best, float(apart.min()))
+    return best
+
+
+# --- Files -----------------------------------------------------------------------------------
+
+
+def _written(
+    folder: File, found: Scan, curves: tuple[Curve, ...], compared: tuple[Compared, ...]
+) -> tuple[File, ...]:
+    from validation.phase_plot import save_diagram
+
+    """Write boundaries, check and picture; the table of cases has long been written."""
+    files = [_write(folder / "boundaries.csv", BOUNDARY_COLUMNS, _boundary_cells(curves))]
+    if compared:
+        files.append(_write(folder / "check.csv", CHECK_COLUMNS, map(_check_cells, compared)))
+    files.append(save_diagram(found, curves, folder / f"{found.family.name}.png"))
+    return tuple(files)
+
+
+MODE_COLUMNS = ("label", "foldable", "stable", "snapping", "moment", "slope", "folds", "error")
+CASE_COLUMNS = ("shape", "twist_axis", *PARAMETERS, *MODE_COLUMNS, "status", "message")
+BOUNDARY_COLUMNS = ("boundary", "twist_axis", *PARAMETERS, "gamma", "moment", "error", "curve")
+CHECK_COLUMNS = (
+    *("shape", "twist_axis", *PARAMETERS, "where", "agrees", "bvp", "rod"),
+    *("moment_bvp", "moment_rod", "slope_bvp", "slope_rod", "message"),
+)
+
+
+def _case_cells(row: Row) -> list[str]:
+    """What a case took is left out, so that the same cases are the same file."""
+    folds = " ".join(map(repr, row.folds))
+    mode = [row.label, _word(row.foldable), _word(row.stable), row.snapping]
+    mode += [_number(row.moment), _number(row.slope), folds, _number(row.error)]
+    return [row.case.shape, row.case.twist_axis, *_values(row.case), *mode, row.status, row.message]
+
+
+def _boundary_cells(curves: Iterable[Curve]) -> Iterable[list[str]]:
+    for n, curve in enumerate(curves):
+        for point in curve.points:
+            numbers = map(_number, (point.gamma, point.moment, point.error))
+            yield [curve.kind, curve.twist_axis, *_values(point.case), *numbers, str(n)]
+
+
+def _check_cells(pair: Compared) -> list[str]:
+    bvp, rod = pair.bvp, pair.rod
+    numbers = map(_number, (bvp.moment, rod.moment, bvp.slope, rod.slope))
+    verdict = ["near" if pair.near else "away", _word(pair.agrees), bvp.label, rod.label]
+    case = bvp.case
+    return [case.shape, case.twist_axis, *_values(case), *verdict, *numbers, rod.message]
+
+
+def _values(case: Case) -> list[str]:
+    return [_number(getattr(case, name)) for name in PARAMETERS]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None or math.isnan(value) else repr(float(value))
+
+
+def _word(truth: bool) -> str:
+    return "true" if truth else "false"
+
+
+def _write(file: File, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> File:
+    text = io.StringIO(newline="")
+    table_of = csv.writer(text, lineterminator="\n")
+    table_of.writerow(columns)
+    table_of.writerows(rows)
+    content = text.getvalue().encode()
+    write_whole(file, lambda opened: opened.write(content))
+    return file
