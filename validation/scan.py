@@ -116,7 +116,7 @@ def scan(
                 new = sorted(child for cell in split for child in _children(cell))
     except KeyboardInterrupt:
         crew.stop()
-        raise Interrupted(f"{len(store)} cases are in {store.file}") from None
+        raise Interrupted(f"{store.safe} cases are in {store.file}") from None
     return Scan(family, rows, tuple(sorted(leaves)), len(store) - before)
 
 

@@ -57,6 +57,11 @@ class Store:
     def __len__(self) -> int:
         return len(self.rows)
 
+    @property
+    def safe(self) -> int:
+        """How many cases are on disk: at Ctrl-C in the midst of `add`, more than are in `rows`."""
+        return self.file.read_bytes().count(b"\n")
+
     def add(self, rows: Iterable[Row]) -> None:
         """Keep rows, on disk before anything else happens.
 
