@@ -505,6 +505,91 @@ def figure(
     raise typer.Exit(code)
 
 
+@dataclass(frozen=True)
+class LandscapeOptions:
+    """Which landscape, and what is written."""
+
+    two_dimensional: Annotated[
+        bool, typer.Option("--two-dimensional", help="Over twist and grip distance.")
+    ] = False
+    free: Annotated[bool, typer.Option("--free", help="The barrier with the grips removed.")] = (
+        False
+    )
+    cells: Annotated[
+        int, typer.Option(parser=_whole, help="Along each side, with --two-dimensional.")
+    ] = 60
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write it here ('-': output).")] = (
+        None
+    )
+    plot: Annotated[str | None, typer.Option(metavar="F", help="Draw it: .png, .pdf, .svg.")] = None
+    out: Annotated[
+        str | None, typer.Option(metavar="DIR", help="Write landscape.json and .png here.")
+    ] = None
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False
+
+
+@_command(RingOptions, PathOptions, LandscapeOptions)
+def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) -> int:
+    """Map the energy: rests, wells, saddles, and barriers to fold the ring and to open it."""
+    with _options_named():
+        if wanted.two_dimensional and wanted.free:
+            raise ValueError("free cannot be given together with --two-dimensional, got both")
+        if not 3 <= wanted.cells <= 1000:
+            raise ValueError(f"cells must be from 3 to 1000, got {wanted.cells}")
+        scene = path.scene(ring, error_bars=not wanted.two_dimensional)
+        written = targets(wanted.json, wanted.plot, None, wanted.out, stem="landscape")
+        written.pop("shapes", None)
+        found: Any
+        with _progress(scene, quiet=wanted.quiet) as tick:
+            if wanted.two_dimensional:
+                from der.landscape_surface import surface
+
+                found = surface(scene, shape=(wanted.cells, wanted.cells), progress=tick)
+            elif wanted.free:
+                from der.landscape_free import free_barrier
+
+                found = free_barrier(scene)
+            else:
+                from der.landscape_curve import landscape as along
+
+                found = along(scene, progress=tick)
+    code = {"done": 0, "interrupted": 130}.get(found.status, 3)
+    return _write_landscape(found, written, code, quiet=wanted.quiet)
+
+
+def _write_landscape(found: Any, written: dict[str, File], code: int, *, quiet: bool) -> int:
+    """Write a landscape and its picture, say what there is to say, and return the exit code."""
+    from der.landscape_words import words
+
+    for name, file in written.items():
+        try:
+            if name == "plot":
+                _draw_landscape(found, file)
+            elif file != OUTPUT:
+                found.save(file)
+        except (OSError, ValueError) as wrong:
+            say(f"der: could not write {file}: {wrong}")
+            code = code or 3
+    if written.get("json") == OUTPUT:
+        return code if show(found.to_json().rstrip()) else code or 3
+    if not quiet and not show(words(found)):
+        code = code or 3
+    return code
+
+
+def _draw_landscape(found: Any, file: File) -> None:
+    from der import view_landscape as view
+    from der.landscape_record import Landscape, Surface
+
+    if isinstance(found, Landscape):
+        figure = view.figure_of_landscape(found)
+    elif isinstance(found, Surface):
+        figure = view.figure_of_surface(found)
+    else:
+        figure = view.figure_of_pass(found)
+    view.save_figure(figure, file)
+
+
 PHASES = {  # the diagrams of each shape, that of a cube last
     "ellipse": ("fig3a",),
     "rectangle": ("fig5b", "fig5c", "fig5a"),

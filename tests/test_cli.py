@@ -189,6 +189,13 @@ WRONG = [
     (("bvp", *line()[1:], "--stretch", "finite"), "--stretch", "'finite'", "'inextensible'"),
     (("compare", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
     (("compare", *line()[1:], "--edges", "24"), "--edges", "24", "divisible by 16"),
+    (("landscape", *line()[1:], "--edges", "20"), "--edges", "20", "divisible by 16"),
+    (("landscape", *line()[1:], "--free", "--two-dimensional"), "--free", "both", "together"),
+    (("landscape", *line()[1:], "--cells", "2"), "--cells", "2", "from 3 to 1000"),
+    (("phase", "square", "--out", "d"), "SHAPE", "'square'", "ellipse"),
+    (("phase", "ellipse", "--out", "d", "--check", "rod"), "--check", "'rod'", "'der'"),
+    (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
+    (("phase", "ellipse", "--out", "d", "--range", "x=1:2"), "--range", "'x'", "h_over_t"),
     (("figure", "fig99", "--out", "."), "--name", "'fig99'", "fig2b"),
     (line("--egdes", "16"), "--egdes", "No such option", "--edges"),
     (("fold", "circle", "--h-over-t"), "--h-over-t", "requires", "argument"),
@@ -673,3 +680,26 @@ def test_an_output_that_is_full_is_said_in_one_line():
         done = shell(*SMALL, "--gamma-max", "0.1", stdout=output)
     assert done.returncode == 3
     assert done.stderr == "der: could not write to standard output: No space left on device\n"
+
+
+def test_landscape_says_what_folding_and_opening_cost(run, tmp_path):
+    """The circle at h/t = 4: flat and folded wells and a saddle; barriers are differences of U."""
+    file = tmp_path / "landscape.json"
+    code, out, err = run("landscape", "circle", "--h-over-t", "4", "--json", file)
+    assert (code, err) == (0, [])
+    assert "barrier to open" in out
+    found = entries(file.read_text())
+    flat, saddle, folded = (rest["energy"] for rest in found["rests"])
+    assert found["barriers"]["fold"] == pytest.approx(saddle - flat, abs=1e-12)
+    assert found["barriers"]["open"] == pytest.approx(saddle - folded, abs=1e-12)
+    assert [rest["index_free"] for rest in found["rests"]] == [0, 1, 0]
+
+
+def test_two_dimensional_landscape_is_written(run, tmp_path):
+    """Data and picture of a small one."""
+    words = ("landscape", "circle", "--h-over-t", "1.6", "--two-dimensional", "--cells", "5")
+    code, out, err = run(*words, "--edges", "16", "--out", tmp_path / "new")
+    assert (code, err) == (0, [])
+    assert "5 x 5 cells" in out
+    assert len(entries((tmp_path / "new" / "landscape.json").read_text())["energy"]) == 5
+    assert (tmp_path / "new" / "landscape.png").read_bytes().startswith(b"\x89PNG")

@@ -28,7 +28,7 @@ ROOMS = {
         "sections",
         "scene",
     ),
-    "answer": ("files", "shapes", "record", "unfinished"),
+    "answer": ("files", "shapes", "record", "unfinished", "landscape_record"),
     "kernels": ("frames", "strain", "dense", "block_ldl", "linking", "assembly"),
     "engine": (
         "rod",
@@ -53,11 +53,20 @@ ROOMS = {
         "error_bars",
         "unfolding",
         "folding",
+        "landscape_alone",
+        "landscape_bars",
+        "landscape_rests",
+        "landscape_curve",
+        "landscape_flood",
+        "landscape_surface",
+        "landscape_saddles",
+        "landscape_free",
+        "landscape_over",
     ),
     "film": ("curve", "film", "captions", "ribbon", "panel"),
     "layout": ("view_layout",),
-    "views": ("summary", "view_plots", "view_rerun"),
-    "roof": ("output", "cli", "__main__"),
+    "views": ("summary", "view_plots", "view_rerun", "view_landscape"),
+    "roof": ("output", "landscape_words", "cli", "__main__"),
 }
 # What each room may import from besides itself.
 BELOW = {
@@ -253,6 +262,7 @@ def test_only_commands_import_validation_and_scenarios():
         (
             "matplotlib",
             {
+                "der/view_landscape.py",
                 "der/view_plots.py",
                 "scenarios/hysteresis_plot.py",
                 "validation/comparison_plot.py",

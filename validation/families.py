@@ -45,7 +45,7 @@ class Family:
     nu: float = 0.3
     tolerance: float = TOLERANCE
     coarse: int = 16
-    finest: int = 128
+    finest: int = 64
 
     @property
     def dimension(self) -> int:

@@ -1,0 +1,559 @@
+"""Energy landscapes as pictures: along the path, over twist and distance, and barriers over h/t."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import PowerNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
+
+from der.checks import Array
+from der.curve import stretches
+from der.files import FilePath, write_whole
+from der.landscape_record import BarrierCurves, Landscape, Pass, Rest, Surface
+
+FORMATS = (".png", ".pdf", ".svg")
+DPI = 150
+INK, QUIET = "#222222", "#8a8a8a"
+STABLE, UNSTABLE, FREE = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito
+BRANCHES: Mapping[object, tuple[str, str, Any]] = {
+    True: ("stable ($\\gamma$ held)", STABLE, "-"),
+    False: ("unstable ($\\gamma$ held)", UNSTABLE, (0, (3.5, 1.6))),
+    None: ("equilibria", STABLE, "-"),
+}
+RESTS = {"well": ("well", "o", INK), "saddle": ("saddle", "^", "white")}
+HALO = [withStroke(linewidth=2.5, foreground="white")]
+UNITS = {"vertex_angle": "°"}
+LEVELS = 28  # of a filled contour
+RINGS, ACROSS = 6, 200  # rings on a pass, points along each
+CEILING = 1.35  # of the path's largest energy: what lies above is one colour
+
+
+def save_figure(figure: Figure, file: FilePath) -> None:
+    """Write a figure, whole or not at all, in the format of the file's suffix.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is not one of FORMATS or the place cannot be written to.
+    """
+    suffix = File(file).suffix.lower()
+    if suffix not in FORMATS:
+        raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
+    try:
+        write_whole(file, lambda opened: figure.savefig(opened, format=suffix[1:]))
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise ValueError(f"plot {str(file)!r} cannot be written: {reason}") from problem
+
+
+# --- Along the path --------------------------------------------------------------------------
+
+
+def figure_of_landscape(landscape: Landscape) -> Figure:
+    """U over M against gamma, with rests and barriers; beside it the saddle and its well, larger.
+
+    Raises
+    ------
+    ValueError
+        If the path has no state.
+    """
+    path = landscape.path
+    if not len(path):
+        raise ValueError("landscape must have at least one state to be plotted, got none")
+    zoomed = landscape.barriers.open is not None
+    figure = _figure((8.6, 4.6) if zoomed else (6.0, 4.6))
+    figure.text(0.5, 0.965, _title(path.ring, path.section, path.numerics), **_TITLE)
+    grid = figure.add_gridspec(
+        2,
+        2 if zoomed else 1,
+        left=0.075 if zoomed else 0.105,
+        right=0.985,
+        bottom=0.165,
+        top=0.915,
+        height_ratios=(1.9, 1.0),
+        width_ratios=(1.25, 1.0) if zoomed else None,
+        hspace=0.07,
+        wspace=0.24,
+    )
+    above = figure.add_subplot(grid[0, 0])
+    below = figure.add_subplot(grid[1, 0], sharex=above)
+    for panel, height, label in (
+        (above, path.energy, "energy  $U\\,a/GJ$"),
+        (below, path.moment, "moment  $M\\,a/GJ$"),
+    ):
+        _branches(panel, landscape, height)
+        _rests(panel, landscape.rests, height)
+        _dress(panel, label)
+    above.tick_params(labelbottom=False)
+    below.axhline(0.0, color=QUIET, linewidth=0.6, zorder=0)
+    below.set_xlabel("rotation of a grip  $\\gamma/\\pi$", fontsize=9, color=INK)
+    _fold_barrier(above, landscape)
+    if zoomed:
+        beside = figure.add_subplot(grid[:, 1])
+        _saddle_and_well(beside, landscape)
+    handles = [
+        Line2D([], [], color=colour, linestyle=style, label=label)
+        for stable, (label, colour, style) in BRANCHES.items()
+        if stable in {kind for kind, _ in stretches(path, path.energy)}
+    ]
+    kinds = {rest.kind for rest in landscape.rests}
+    handles += [
+        Line2D([], [], label=f"{label}, $M = 0$", **_mark(marker, face))
+        for kind, (label, marker, face) in RESTS.items()
+        if kind in kinds
+    ]
+    _legend(figure, handles)
+    return figure
+
+
+def _branches(panel: Axes, landscape: Landscape, height: Array) -> None:
+    for stable, points in stretches(landscape.path, height):
+        _, colour, style = BRANCHES[stable]
+        panel.plot(*points.T, color=colour, linestyle=style, linewidth=1.6, zorder=2)
+
+
+def _rests(panel: Axes, rests: tuple[Rest, ...], height: Array) -> None:
+    for rest in rests:
+        _, marker, face = RESTS[rest.kind]
+        place = (rest.gamma / math.pi, height[rest.position])
+        panel.plot(*place, zorder=5, clip_on=False, **_mark(marker, face))
+
+
+def _fold_barrier(panel: Axes, landscape: Landscape) -> None:
+    """The height of the saddle above the flat ring, as an arrow where there is most room."""
+    found = landscape.barriers
+    panel.margins(x=0.03, y=0.1)
+    panel.autoscale_view()
+    if found.fold is None or found.saddle is None:
+        text = found.why.get("fold", "")
+        panel.set_title(text, fontsize=7.5, color=QUIET, loc="left", wrap=True)
+        return
+    saddle, flat = landscape.rests[found.saddle], landscape.rests[0]
+    x = 0.1
+    _level(panel, saddle.energy, (0.0, saddle.gamma / math.pi))
+    _arrow(panel, x, flat.energy, saddle.energy)
+    _say(panel, (x, flat.energy + 0.72 * found.fold), f"to fold\n{found.fold:.4g}", (7.0, 0.0))
+
+
+def _saddle_and_well(panel: Axes, landscape: Landscape) -> None:
+    """The neighbourhood of the saddle and the folded well, with the barrier to open."""
+    found, path = landscape.barriers, landscape.path
+    if found.open is None or found.saddle is None:
+        return
+    saddle, end = landscape.rests[found.saddle], landscape.rests[-1]
+    _branches(panel, landscape, path.energy)
+    _rests(panel, landscape.rests, path.energy)
+    span = (end.gamma - saddle.gamma) / math.pi
+    x = end.gamma / math.pi + 0.12 * span
+    panel.set_xlim(saddle.gamma / math.pi - 0.75 * span, end.gamma / math.pi + 0.45 * span)
+    panel.set_ylim(end.energy - 0.7 * found.open, saddle.energy + 0.45 * found.open)
+    _level(panel, saddle.energy, (saddle.gamma / math.pi, x))
+    _level(panel, end.energy, (end.gamma / math.pi, x))
+    _arrow(panel, x, end.energy, saddle.energy)
+    middle = 0.5 * (end.energy + saddle.energy)
+    _say(panel, (x, middle), f"to open\n{found.open:.4g}", (6.0, 0.0))
+    for rest, name, away in ((saddle, "saddle", 11.0), (end, "folded", -16.0)):
+        ways = "?" if rest.index_free is None else rest.index_free
+        text = f"{name}\n$\\gamma$ = {rest.gamma / math.pi:.4f} $\\pi$\nways down alone: {ways}"
+        up = away > 0.0
+        panel.annotate(
+            text,
+            (rest.gamma / math.pi, rest.energy),
+            xytext=(0.0, away),
+            textcoords="offset points",
+            ha="center",
+            va="bottom" if up else "top",
+            fontsize=7.5,
+            color=INK,
+            path_effects=HALO,
+            zorder=6,
+        )
+    _dress(panel, "energy  $U\\,a/GJ$")
+    panel.set_xlabel("$\\gamma/\\pi$", fontsize=9, color=INK)
+    panel.ticklabel_format(useOffset=False)
+    panel.xaxis.set_major_locator(MaxNLocator(5))
+
+
+# --- Over h/t --------------------------------------------------------------------------------
+
+
+def figure_of_barriers(curves: BarrierCurves) -> Figure:
+    """Barriers to fold, above, and to open, below, over h/t: in grips, and left alone."""
+    figure = _figure((6.2, 5.0))
+    figure.text(0.53, 0.965, _title(curves.ring, {}, curves.numerics), **_TITLE)
+    grid = figure.add_gridspec(
+        2, 1, left=0.12, right=0.97, bottom=0.145, top=0.915, height_ratios=(1.0, 1.25), hspace=0.07
+    )
+    above = figure.add_subplot(grid[0])
+    below = figure.add_subplot(grid[1], sharex=above)
+    lines = (
+        ("in grips that turn freely", STABLE, "-", "o", curves.fold, curves.open),
+        ("left alone in space", UNSTABLE, (0, (3.5, 1.6)), "s", curves.fold_free, curves.open_free),
+    )
+    handles = []
+    for label, colour, style, marker, *both in lines:
+        if not np.any(np.isfinite(both)):
+            continue
+        look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": 1.6}
+        look["marker"] = marker
+        for panel, values in zip((above, below), both, strict=True):
+            panel.plot(curves.h_over_t, values, markersize=2.8, **look)
+        handles.append(Line2D([], [], label=label, markersize=2.8, **look))
+    above.plot(curves.h_over_t, curves.folded_energy, color=QUIET, linewidth=1.0, linestyle=":")
+    handles.append(
+        Line2D([], [], color=QUIET, linestyle=":", linewidth=1.0, label="energy of the folded ring")
+    )
+    _dress(above, "to fold  $\\Delta U\\,a/GJ$")
+    _dress(below, "to open  $\\Delta U\\,a/GJ$")
+    above.tick_params(labelbottom=False)
+    below.axhline(0.0, color=QUIET, linewidth=0.6, zorder=0)
+    for panel in (above, below):
+        panel.set_xscale("log")
+        panel.xaxis.set_minor_locator(FixedLocator([]))
+    low, high = float(curves.h_over_t.min()), float(curves.h_over_t.max())
+    ticks = [tick for tick in (1, 1.5, 2, 3, 4, 6, 8, 10, 15, 20, 30, 50) if low <= tick <= high]
+    below.xaxis.set_major_locator(FixedLocator(ticks))
+    below.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    below.set_xlabel("height over thickness of the section  $h/t$", fontsize=9, color=INK)
+    _legend(figure, handles)
+    return figure
+
+
+# --- Over twist and distance -----------------------------------------------------------------
+
+
+def figure_of_surface(surface: Surface) -> Figure:
+    """Contours of the least energy over twist and grip distance, and the surface in perspective.
+
+    Raises
+    ------
+    ValueError
+        If no cell has a minimum.
+    """
+    if not np.any(np.isfinite(surface.energy)):
+        raise ValueError("surface must have a minimum in some cell to be plotted, got none")
+    figure = _figure((10.4, 4.7))
+    figure.text(0.5, 0.965, _title(surface.ring, surface.section, surface.numerics), **_TITLE)
+    panel = figure.add_axes((0.06, 0.175, 0.42, 0.74))
+    x, y = surface.gamma / math.pi, surface.distance
+    ceiling = CEILING * float(np.nanmax(surface.path[2]))
+    norm = PowerNorm(0.7, 0.0, ceiling)
+    values = np.ma.masked_invalid(np.minimum(surface.energy, 2.0 * ceiling)).T
+    levels = ceiling * np.linspace(0.0, 1.0, LEVELS) ** 1.4
+    filled = panel.contourf(x, y, values, levels, cmap="YlGnBu_r", norm=norm, extend="max")
+    panel.contour(x, y, values, levels, colors=INK, linewidths=0.35, alpha=0.35)
+    handles = [*_several(panel, surface), *_overlay(panel, surface)]
+    _dress(panel, "distance of the grips  $d/a$")
+    panel.margins(0.0)
+    panel.set_xlim(float(x[0]), float(x[-1]))
+    panel.set_ylim(float(y[0]), float(y[-1]))
+    panel.set_xlabel("rotation of a grip  $\\gamma/\\pi$", fontsize=9, color=INK)
+    bar = figure.colorbar(filled, cax=figure.add_axes((0.492, 0.175, 0.011, 0.74)))
+    bar.set_label("least energy  $U\\,a/GJ$", fontsize=8.5, color=INK)
+    bar.locator = FixedLocator(MaxNLocator(7).tick_values(0.0, 0.97 * ceiling)[:-1])
+    bar.update_ticks()
+    bar.ax.tick_params(labelsize=7.5, color=QUIET, labelcolor=INK)
+    bar.outline.set_visible(False)
+    _relief(figure, surface, ceiling, norm)
+    _legend(figure, handles)
+    return figure
+
+
+def _several(panel: Axes, surface: Surface) -> Iterator[Patch]:
+    """Hatching over cells with several minima, and dots over those with a way down aside."""
+    x, y = surface.gamma / math.pi, surface.distance
+    for chosen, hatch, label in (
+        (surface.count > 1, "////", "several minima"),
+        (surface.index > 0, "....", "a lower one without symmetry"),
+    ):
+        if np.any(chosen):
+            shade = panel.contourf(
+                x, y, chosen.T.astype(float), (0.5, 1.5), colors="none", hatches=(hatch,)
+            )
+            shade.set(edgecolor=(0.13, 0.13, 0.13, 0.35), linewidth=0.0)
+            yield Patch(
+                facecolor="#d9ecd0", edgecolor=QUIET, linewidth=0.0, hatch=hatch, label=label
+            )
+
+
+def _overlay(panel: Axes, surface: Surface) -> Iterator[Line2D]:
+    """The path of twisting with its folds and rests, and snaps."""
+    line: dict[str, Any] = {"color": INK, "linewidth": 1.5}
+    edge = [withStroke(linewidth=2.8, foreground="white")]
+    turn, away, _ = surface.path
+    panel.plot(turn / math.pi, away, path_effects=edge, zorder=3, **line)
+    yield Line2D([], [], label="path of twisting", **line)
+    for one in surface.snaps:
+        panel.plot(one[:, 0] / math.pi, one[:, 1], color=UNSTABLE, linewidth=1.4, zorder=4)
+        panel.annotate(
+            "",
+            (one[-1, 0] / math.pi, one[-1, 1]),
+            xytext=(one[0, 0] / math.pi, one[0, 1]),
+            arrowprops={"arrowstyle": "-|>", "color": UNSTABLE, "linewidth": 1.4},
+            zorder=4,
+        )
+    if surface.snaps:
+        yield Line2D([], [], color=UNSTABLE, linewidth=1.4, marker=">", markersize=4, label="snap")
+    for places, label, marker, face in (
+        (surface.folds, "fold", "D", "white"),
+        (surface.rests, "$M = 0$", "o", "#F0E442"),
+    ):
+        if len(places):
+            look = _mark(marker, face) | {"markersize": 5.0}
+            panel.plot(places[:, 0] / math.pi, places[:, 1], zorder=5, clip_on=False, **look)
+            yield Line2D([], [], label=label, **look)
+
+
+def _relief(figure: Figure, surface: Surface, ceiling: float, norm: PowerNorm) -> None:
+    """The surface in perspective, cut off at the ceiling, with the path on it."""
+    panel: Any = figure.add_axes((0.6, 0.09, 0.4, 0.9), projection="3d")
+    x, y, height = _finer(surface)
+    panel.plot_surface(
+        x,
+        y,
+        np.where(height <= ceiling, height, np.nan),
+        cmap="YlGnBu_r",
+        norm=norm,
+        rcount=len(x),
+        ccount=len(y),
+        linewidth=0.0,
+        antialiased=False,
+        alpha=0.9,
+    )
+    turn, away, energy = surface.path
+    shown = (turn >= surface.gamma[0]) & (turn <= surface.gamma[-1])
+    along = np.where(shown, energy, np.nan)
+    panel.plot(turn / math.pi, away, along + 0.01 * ceiling, color=INK, linewidth=1.6, zorder=10)
+    for one in surface.snaps:
+        over = one[:, 2] + 0.01 * ceiling
+        panel.plot(one[:, 0] / math.pi, one[:, 1], over, color=UNSTABLE, linewidth=1.5, zorder=11)
+    panel.set_zlim(0.0, ceiling)
+    panel.view_init(elev=27.0, azim=-128.0)
+    panel.zaxis.set_rotate_label(False)
+    panel.set_box_aspect((1.25, 1.0, 0.8), zoom=0.95)
+    for axis, label in (
+        (panel.xaxis, "$\\gamma/\\pi$"),
+        (panel.yaxis, "$d/a$"),
+        (panel.zaxis, "$U\\,a/GJ$"),
+    ):
+        axis.set_label_text(label, fontsize=8.5, color=INK)
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        axis.line.set_color(QUIET)
+        axis._axinfo["grid"].update(color="#e2e2e2", linewidth=0.5)
+        axis.set_major_locator(MaxNLocator(5))
+    panel.tick_params(labelsize=7, pad=0, color=QUIET, labelcolor=INK)
+
+
+def _finer(surface: Surface) -> tuple[Array, Array, Array]:
+    """The grid and its energies, three times as fine, so that a cut through it is smooth."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    axes = (surface.gamma, surface.distance)
+    finer = [np.linspace(axis[0], axis[-1], 3 * len(axis) - 2) for axis in axes]
+    gamma, distance = np.meshgrid(*finer, indexing="ij")
+    height = RegularGridInterpolator(axes, surface.energy)((gamma, distance))
+    return gamma / math.pi, distance, height
+
+
+# --- Left alone ------------------------------------------------------------------------------
+
+
+def figure_of_pass(found: Pass) -> Figure:
+    """Energy along the minimum-energy path, with the ring on its way above it.
+
+    Raises
+    ------
+    ValueError
+        If there is no such path.
+    """
+    if found.saddle is None or found.fold is None or found.open is None:
+        raise ValueError(f"pass must have a saddle to be plotted: {found.why}")
+    figure = _figure((7.6, 5.0))
+    figure.text(0.5, 0.965, _title(found.ring, found.section, found.numerics), **_TITLE)
+    panel = figure.add_axes((0.085, 0.115, 0.895, 0.53))
+    panel.margins(x=0.11)
+    progress, energy = found.way.T
+    top = int(np.argmax(energy))
+    panel.plot(progress, energy, color=STABLE, linewidth=1.7, zorder=2)
+    ends = ((0, "well"), (top, "saddle"), (len(energy) - 1, "well"))
+    for k, kind in ends:
+        _, marker, face = RESTS[kind]
+        panel.plot(progress[k], energy[k], zorder=5, clip_on=False, **_mark(marker, face))
+    _dress(panel, "energy  $U\\,a/GJ$")
+    panel.set_xlabel(
+        "way down both sides of the saddle  [rad, root mean square]", fontsize=9, color=INK
+    )
+    _annotate_pass(panel, found, float(progress[top]))
+    row = figure.add_axes((0.085, 0.675, 0.895, 0.25))
+    low, high = panel.get_xlim()
+    row.set_xlim(low, high)
+    _rings(row, found)
+    row.set_xlim(low, high)
+    return figure
+
+
+def _annotate_pass(panel: Axes, found: Pass, at: float) -> None:
+    """Barriers of the free ring and of twisting, in words and in an enlargement of the top."""
+    saddle = found.saddle
+    if saddle is None or found.fold is None or found.open is None:
+        return
+    kind = "the saddle of twisting" if saddle.twisted else "a saddle beside that of twisting"
+    lines = [
+        f"{kind}, ways down: {saddle.index}",
+        f"to fold {found.fold:.5g}   (twisting {_number(found.twisting.fold)})",
+        f"to open {found.open:.5g}   (twisting {_number(found.twisting.open)})",
+    ]
+    panel.text(
+        0.03, 0.95, "\n".join(lines), transform=panel.transAxes, va="top", fontsize=8, color=INK
+    )
+    progress, energy = found.way.T
+    inset = panel.inset_axes((0.6, 0.1, 0.27, 0.48))
+    end = float(progress[-1])
+    inset.plot(progress, energy, color=STABLE, linewidth=1.4)
+    inset.set_xlim(at - 0.8 * (end - at), end + 0.1 * (end - at))
+    inset.set_ylim(energy[-1] - 0.4 * found.open, energy[-1] + 1.4 * found.open)
+    inset.axhline(energy[-1], color=QUIET, linewidth=0.6, linestyle=":")
+    inset.tick_params(labelsize=6.5, color=QUIET, labelcolor=INK, direction="in")
+    inset.ticklabel_format(useOffset=False)
+    panel.indicate_inset_zoom(inset, edgecolor=QUIET)
+
+
+def _rings(row: Axes, found: Pass) -> None:
+    """Rings on the way, each over its place on the curve below, in one scale."""
+    chosen = np.linspace(0, len(found.shapes) - 1, RINGS).round().astype(int)
+    end = float(found.way[-1, 0])
+    views = [_view(found.shapes[k]) for k in chosen]
+    widest = max(float(np.ptp(view[:, 0])) for view in views)
+    scale = 0.86 * end / (RINGS - 1) / widest
+    for i, view in enumerate(views):
+        middle = 0.5 * (view.min(axis=0) + view.max(axis=0))
+        ring = scale * (view - middle)
+        ring[:, 0] += i * end / (RINGS - 1)
+        for k in np.argsort(ring[:-1, 2]):
+            near = slice(max(k - 1, 0), k + 3)
+            row.plot(*ring[k : k + 2, :2].T, color="white", linewidth=3.4, solid_capstyle="butt")
+            row.plot(*ring[near, :2].T, color=STABLE, linewidth=1.5, solid_capstyle="round")
+    row.set_aspect("equal", adjustable="datalim")
+    row.set_axis_off()
+
+
+def _view(x: Array) -> Array:
+    """Smooth closed curve (n, 3) through vertices: to the right, up and towards the reader.
+
+    The ring is seen from 40 degrees off the normal of the plane to which it is closest.
+    """
+    from scipy.interpolate import CubicSpline
+
+    n = len(x)
+    curve = CubicSpline(np.arange(n + 1), np.append(x, x[:1], axis=0), bc_type="periodic")
+    fine = curve(np.linspace(0.0, n, ACROSS + 1))
+    centred = fine - fine.mean(axis=0)
+    right, up, towards = np.linalg.svd(centred, full_matrices=False)[2]
+    tilt = math.radians(40.0)
+    seen_up = math.cos(tilt) * up + math.sin(tilt) * towards
+    seen_towards = -math.sin(tilt) * up + math.cos(tilt) * towards
+    return np.asarray(centred @ np.stack([right, seen_up, seen_towards], axis=1))
+
+
+# --- Pieces ----------------------------------------------------------------------------------
+
+_TITLE: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9.5, "color": INK}
+
+
+def _figure(size: tuple[float, float]) -> Figure:
+    figure = Figure(figsize=size, dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _title(
+    ring: Mapping[str, object], section: Mapping[str, object], numerics: Mapping[str, object]
+) -> str:
+    """Ring, section and mesh in one line."""
+    words = [str(ring["shape"])]
+    words += [
+        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}{UNITS.get(name, '')}"
+        for name, value in ring.items()
+        if isinstance(value, float) and (name, value) != ("natural_curvature", 1.0)
+    ]
+    if ring.get("twist_axis") == "y":
+        words.append("about y")
+    parts = [", ".join(words)]
+    if section.get("h_over_t") is not None:
+        parts.append(f"h/t = {section['h_over_t']:g}")
+    elif section:
+        parts.append(rf"$\alpha$ = {section['alpha']:.4g}, $\beta$ = {section['beta']:.4g}")
+    edges = f"{numerics.get('n_edges')} edges"
+    parts.append(f"extrapolated from {edges}" if numerics.get("error_bars") else edges)
+    return "   |   ".join(parts)
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.5g}"
+
+
+def _dress(panel: Axes, label: str) -> None:
+    panel.set_ylabel(label, fontsize=9, color=INK)
+    panel.tick_params(labelsize=8, color=QUIET, labelcolor=INK, direction="in")
+    panel.spines[["top", "right"]].set_visible(False)
+    panel.spines[["left", "bottom"]].set_color(QUIET)
+
+
+def _mark(marker: str, face: str) -> dict[str, Any]:
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "markersize": 5.6 if marker == "o" else 6.6,
+        "markerfacecolor": face,
+        "markeredgecolor": INK,
+        "markeredgewidth": 0.9,
+    }
+
+
+def _level(panel: Axes, height: float, across: tuple[float, float]) -> None:
+    panel.plot(across, (height, height), color=QUIET, linewidth=0.7, linestyle=":", zorder=1)
+
+
+def _arrow(panel: Axes, x: float, low: float, high: float) -> None:
+    look = {"arrowstyle": "<|-|>", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
+    panel.annotate("", (x, high), xytext=(x, low), arrowprops=look, zorder=4)
+
+
+def _say(panel: Axes, place: tuple[float, float], text: str, away: tuple[float, float]) -> None:
+    panel.annotate(
+        text,
+        place,
+        xytext=away,
+        textcoords="offset points",
+        va="center",
+        fontsize=8.5,
+        color=INK,
+        path_effects=HALO,
+        zorder=6,
+    )
+
+
+def _legend(figure: Figure, handles: list[Any]) -> None:
+    figure.legend(
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 0.005),
+        ncols=min(len(handles), 7),
+        frameon=False,
+        fontsize=8,
+        handlelength=2.4,
+        columnspacing=1.7,
+        handletextpad=0.5,
+        labelcolor=INK,
+    )

@@ -1,0 +1,43 @@
+"""How easily a folded ring opens that is left alone: ellipse, b/a = 0.6, over h/t.
+
+In grips that turn freely the folded ellipse sits behind a barrier that the path of twisting shows.
+Left alone it need not open the way it was folded: a saddle without that symmetry is far lower. At
+h/t = 4 it takes 0.01068 GJ/a instead of 0.6713; below h/t = 3.636 nothing holds the ring at all,
+where twisting shows a well down to 2.197. A circle's saddle is the same with and without grips.
+
+    python -m scenarios.landscape_left_alone [DIR]
+
+writes pass.json and pass.png (h/t = 4), barriers.json and barriers.png to DIR (default:
+out/landscape_left_alone).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import der
+from der.landscape_curve import landscape
+from der.landscape_free import free_barrier
+from der.landscape_over import barriers_over
+from scenarios.output import folder
+
+H_OVER_T = np.geomspace(1.8, 30.0, 24)
+ring = der.ellipse(b_over_a=0.6)
+
+scene = der.Scene(ring, der.rectangular_section(4.0), error_bars=True)
+twisted = landscape(scene)
+found = free_barrier(scene)
+
+if __name__ == "__main__":
+    from der.view_landscape import figure_of_barriers, figure_of_pass, save_figure
+
+    place = folder("landscape_left_alone")
+    found.save(place / "pass.json")
+    save_figure(figure_of_pass(found), place / "pass.png")
+    curves = barriers_over(ring, H_OVER_T, free=True)
+    curves.save(place / "barriers.json")
+    save_figure(figure_of_barriers(curves), place / "barriers.png")
+    for name, one in (("left alone", found), ("by twisting", twisted)):
+        value, error = one.extrapolated["open"]
+        print(f"to open {name}: {value:.5f} +- {error:.0e} GJ/a")
+    print(f"written to {place}")

@@ -1,0 +1,43 @@
+"""A fold of the path is a double well in the distance of the grips: circle, h/t = 1.6.
+
+Prescribe the distance of the grips besides their rotation, and the state is a single-valued
+function of both: over the plane (gamma, d) the energy is one smooth sheet. Between the two folds of
+the path it has two valleys at the same gamma, a near and a far one, and the unstable branch is the
+ridge between them; at either fold a valley ends, and the ring snaps across.
+
+    python -m scenarios.landscape_over_twist_and_distance [DIR]
+
+writes surface.json and surface.png to DIR (default: out/landscape_over_twist_and_distance).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import der
+from der.landscape_surface import surface
+from scenarios.output import folder
+
+sheet = surface(der.Scene(der.circle(), der.rectangular_section(1.6)), shape=(48, 48))
+
+
+def valleys(energy: np.ndarray) -> int:
+    """Local minima of a row of energies over the distance, inside it."""
+    return int(np.sum((energy[1:-1] < energy[:-2]) & (energy[1:-1] < energy[2:])))
+
+
+first, second = sheet.folds[:, 0]  # gamma turns back at the first, and on again at the second
+rows = [valleys(row) for row in sheet.energy]
+between = [n for gamma, n in zip(sheet.gamma, rows, strict=True) if second < gamma < first]
+before = [n for gamma, n in zip(sheet.gamma, rows, strict=True) if gamma < second]
+least = [float(sheet.energy[:, j].min()) for j in range(len(sheet.distance))]
+
+if __name__ == "__main__":
+    from der.view_landscape import figure_of_surface, save_figure
+
+    place = folder("landscape_over_twist_and_distance")
+    sheet.save(place / "surface.json")
+    save_figure(figure_of_surface(sheet), place / "surface.png")
+    print(f"{sheet.energy.size} cells in {sheet.solve_s:.1f} s, {np.sum(sheet.count == 0)} empty")
+    print(f"valleys before the folds {set(before)}, between them {set(between)}")
+    print(f"written to {place}")

@@ -1,0 +1,221 @@
+"""Landscapes as records, what they say where something is missing, and their pictures."""
+
+import functools
+import json
+import math
+import os
+import signal
+
+import numpy as np
+import pytest
+
+import der
+from der.landscape_curve import landscape
+from der.landscape_free import free_barrier
+from der.landscape_over import barriers_over
+from der.landscape_surface import surface
+from der.view_landscape import (
+    figure_of_barriers,
+    figure_of_landscape,
+    figure_of_pass,
+    figure_of_surface,
+    save_figure,
+)
+
+
+def scene(h_over_t=4.0, ring=None, **numerics):
+    return der.Scene(
+        ring or der.circle(), der.rectangular_section(h_over_t), **{"n_edges": 32, **numerics}
+    )
+
+
+@functools.cache
+def along(h_over_t=8.0):
+    return landscape(scene(h_over_t))
+
+
+@functools.cache
+def sheet():
+    return surface(scene(1.6), shape=(9, 8))
+
+
+@functools.cache
+def alone(h_over_t=5.0):
+    return free_barrier(scene(h_over_t, der.ellipse(0.6)))
+
+
+def test_json_of_a_landscape(tmp_path):
+    """The keys that were promised; arrays of one length; what is null has a sentence."""
+    along(8.0).save(tmp_path / "one.json")
+    entries = json.loads((tmp_path / "one.json").read_text())
+    promised = "schema ring section numerics gamma energy moment index rests barriers"
+    assert set(promised.split()) <= set(entries)
+    assert entries["schema"] == 1
+    assert len({len(entries[name]) for name in ("gamma", "energy", "moment", "index")}) == 1
+    for rest in entries["rests"]:
+        assert {"gamma", "energy", "index_moment", "index_free", "kind"} <= set(rest)
+        assert entries["gamma"][rest["position"]] == rest["gamma"]
+    assert entries["barriers"]["open"] > 0.0
+    low = json.loads(along(3.0).to_json())
+    assert low["barriers"]["open"] is None
+    assert len(low["why"]["open"]) > 20
+
+
+def test_a_path_that_does_not_fold_has_no_barriers():
+    """h/t = 0.5 never comes back to the folded state: kept as far as it goes, and said."""
+    one = landscape(scene(0.5, n_edges=16, stability=False))
+    assert not one.folded
+    assert one.path.status == "not converged"
+    assert one.barriers.fold is one.barriers.open is one.barriers.saddle is None
+    assert one.barriers.why["fold"] == one.path.message
+    assert len(one.path.message) > 20
+    assert one.rests[0].kind == "well"
+
+
+def test_without_stability_only_rests_have_an_index():
+    """What was not asked for is not computed; rests are few."""
+    one = landscape(scene(8.0, stability=False))
+    at = [rest.position for rest in one.rests]
+    assert [rest.index_free for rest in one.rests] == [0, 1, 0]
+    assert one.path.index[at].tolist() == [0, 0, 0]
+    assert np.ma.getmaskarray(one.path.index).sum() == len(one.path) - len(at)
+
+
+def test_ctrl_c_keeps_the_landscape_so_far():
+    """Pressed at the tenth state: status interrupted, ten states, no barrier."""
+    seen = []
+
+    def press(gamma):
+        seen.append(gamma)
+        if len(seen) == 10:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    one = landscape(scene(), progress=press)
+    assert one.path.status == "interrupted"
+    assert len(one.path) == 10
+    assert one.barriers.fold is None
+
+
+def test_json_of_barriers_has_null_for_nan():
+    """NaN is not JSON."""
+    curves = barriers_over(der.circle(), [3.0, 8.0], n_edges=32)
+    entries = json.loads(curves.to_json())
+    assert entries["open"][0] is None
+    assert entries["open"][1] > 0.2
+    assert entries["index_free"] == [2, 1]
+    assert "no well" in entries["why"][0]
+
+
+def test_json_of_a_surface(tmp_path):
+    """Maps of (n, m), minima of every cell, path, folds, rests and snaps."""
+    sheet().save(tmp_path / "one.json")
+    entries = json.loads((tmp_path / "one.json").read_text())
+    for name in ("energy", "moment", "force", "index", "minima"):
+        assert np.array(entries[name], dtype=object).shape[:2] == (9, 8)
+    assert len(entries["folds"]) == 2
+    assert len(entries["snaps"]) == 2
+    assert entries["rests"][-1][0] == math.pi
+
+
+def test_ctrl_c_keeps_the_surface_so_far():
+    """Cells that were not reached say so."""
+
+    def press(share):
+        if share > 0.3:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    try:
+        one = surface(scene(4.0), shape=(12, 12), progress=press, snaps=False)
+    except KeyboardInterrupt:  # pressed twice before it was seen
+        pytest.fail("the first Ctrl-C must not raise")
+    assert one.status == "interrupted"
+    empty = one.count == 0
+    assert 0 < empty.sum() < empty.size
+    assert len(one.reasons) == empty.sum()
+    assert "stopped" in next(iter(one.reasons.values()))
+
+
+def test_cells_beyond_reach_have_a_reason():
+    """At 99.9 % of full stretch, and gamma from 2 on, Newton and relaxation may find nothing."""
+    one = surface(
+        scene(4.0),
+        gamma=np.linspace(0.0, math.pi, 5),
+        shape=(5, 6),
+        distance_range=(2.0, math.pi),
+        snaps=False,
+    )
+    empty = one.count == 0
+    assert len(one.reasons) == empty.sum() > 0
+    assert all(len(why) > 20 for why in one.reasons.values())
+    assert np.isnan(one.energy[empty]).all()
+
+
+@pytest.mark.parametrize("bad", [(2.0, 4.0), (2.0, 1.0)])
+def test_a_range_beyond_full_stretch_is_refused(bad):
+    """Half the ring's length is the most."""
+    with pytest.raises(ValueError, match="distance_range must rise"):
+        surface(scene(), distance_range=bad)
+
+
+def test_the_full_ring_has_no_surface():
+    """It would need both arms' distances."""
+    with pytest.raises(ValueError, match="sector must be auto, half or quarter"):
+        surface(scene(sector="full"))
+
+
+def test_json_of_a_pass():
+    """Barriers of both kinds, the saddle with its certificate, and the way."""
+    entries = json.loads(alone().to_json())
+    assert entries["barriers"]["open"] < entries["twisting"]["open"]
+    assert entries["saddle"]["index"] == 1
+    assert len(entries["way"]["energy"]) == len(entries["way"]["progress"]) > 20
+
+
+def test_pictures(tmp_path):
+    """Each is drawn and saved; what cannot be drawn is refused in a sentence."""
+    curves = barriers_over(der.circle(), [3.0, 4.0, 8.0], n_edges=32)
+    figures = {
+        "landscape": figure_of_landscape(along(8.0)),
+        "without": figure_of_landscape(along(3.0)),
+        "barriers": figure_of_barriers(curves),
+        "surface": figure_of_surface(sheet()),
+        "pass": figure_of_pass(alone()),
+    }
+    for name, figure in figures.items():
+        save_figure(figure, tmp_path / f"{name}.png")
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+    with pytest.raises(ValueError, match="plot must end in"):
+        save_figure(figures["pass"], tmp_path / "pass.txt")
+    with pytest.raises(ValueError, match="no well"):
+        figure_of_pass(alone(3.0))
+
+
+# --- scenarios --------------------------------------------------------------------------------
+
+
+def test_landscape_along_the_path():
+    """The barrier to open vanishes where the folded circle loses its stability, h/t = 3.469928."""
+    from scenarios.landscape_along_the_path import one, threshold
+
+    assert threshold == pytest.approx(3.469928, abs=1e-4)
+    assert one.extrapolated["open"][0] == pytest.approx(0.25946861, abs=3e-5)
+
+
+def test_landscape_over_twist_and_distance():
+    """One valley before the folds, two between them; every cell has its one minimum."""
+    from scenarios.landscape_over_twist_and_distance import before, between, sheet
+
+    assert set(before) == {1}
+    assert set(between) == {2}
+    assert np.all(sheet.count == 1)
+
+
+def test_landscape_left_alone():
+    """0.010682 GJ/a open the folded ellipse, a sixtieth of what twisting shows."""
+    from scenarios.landscape_left_alone import found, twisted
+
+    value, error = found.extrapolated["open"]
+    assert value == pytest.approx(0.010682, abs=3e-6)
+    assert error < 1e-3
+    assert twisted.extrapolated["open"][0] == pytest.approx(0.671334, abs=5e-5)
+    assert found.saddle.index == 1
