@@ -306,7 +306,7 @@ def _values(case: Case) -> list[str]:
 
 
 def _number(value: float | None) -> str:
-    return "" if value is None or math.isnan(value) else repr(float(value))
+    return "" if value is None or not math.isfinite(value) else repr(float(value))
 
 
 def _word(truth: bool) -> str:
