@@ -34,7 +34,8 @@ from der.dense import invert, solve_dense
 MAX_DELAYED = 8
 
 _DELAY_BELOW = 1e-4  # relative size below which a pivot is delayed: growth stays under its inverse
-_NO_STIFFNESS = 1e-10  # of the largest entry: an unknown without stiffness of its own
+_NO_STIFFNESS = 1e-10  # of the row's largest entry: an unknown without stiffness of its own
+_NOTHING = 1e-18  # of the largest entry: a row without stiffness at all
 
 
 class Factors(NamedTuple):
@@ -80,7 +81,16 @@ def factor(diag, off, border):
             for i in range(b):
                 pivot[k, i] = diag[j, k, i]
             own = abs(diag[j, k, k])
-            unit[k] = np.sqrt(own if own > _NO_STIFFNESS * whole else whole)
+            around = 0.0  # the largest entry of its row: stretch may be stiffer by far than bending
+            for i in range(b):
+                around = max(around, abs(diag[j, k, i]))
+                if j < n - 1:
+                    around = max(around, abs(off[j, k, i]))
+                if j > 0:
+                    around = max(around, abs(off[j - 1, i, k]))
+            if around <= _NOTHING * whole:
+                around = whole
+            unit[k] = np.sqrt(own if own > _NO_STIFFNESS * around else around)
         if j > 0:
             for k in range(b):
                 for i in range(b):

@@ -56,8 +56,17 @@ def checked_number(
             number = float(value)
     if math.isfinite(number) and is_allowed(number):
         return number
-    shown = str(value) if isinstance(value, Real) else repr(value)
-    raise ValueError(f"{name} must be {allowed}, got {shown}")
+    raise ValueError(f"{name} must be {allowed}, got {shown(value)}")
+
+
+def shown(value: object) -> str:
+    """A value in a sentence: one line, not too long, and whatever the value is."""
+    try:
+        text = str(value) if isinstance(value, Real) else repr(value)
+    except ValueError:  # whole numbers of more than 4300 digits cannot be printed
+        text = f"a {type(value).__name__} of too many digits"
+    text = " ".join(text.split())
+    return text if len(text) <= 200 else f"{text[:190]} ..."
 
 
 def positive(name: str, value: object) -> float:
@@ -69,7 +78,7 @@ def one_of(name: str, value: object, allowed: Collection[str]) -> str:
     """Return one of the words in `allowed`."""
     if isinstance(value, str) and value in allowed:
         return value
-    raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")
+    raise ValueError(f"{name} must be one of {', '.join(allowed)}, got {shown(value)}")
 
 
 def checked_array(name: str, values: ArrayLike | None, shape: tuple[int | str, ...]) -> Array:
@@ -100,7 +109,7 @@ def checked_array(name: str, values: ArrayLike | None, shape: tuple[int | str, .
     except ValueError:  # rows of different lengths
         given = np.asarray(None)
     if given.dtype.kind not in "iuf" or given.ndim != len(shape):
-        raise ValueError(f"{name} must be an array of numbers, shape {wanted}, got {values!r}")
+        raise ValueError(f"{name} must be an array of numbers, shape {wanted}, got {shown(values)}")
     if any(n != m for n, m in zip(shape, given.shape, strict=True) if isinstance(n, int)):
         raise ValueError(f"{name} must have shape {wanted}, got {given.shape}")
     for place in np.argwhere(~np.isfinite(given))[:1].tolist():
@@ -115,21 +124,21 @@ def text(name: str, value: object) -> str:
     """Return a string."""
     if isinstance(value, str):
         return value
-    raise ValueError(f"{name} must be a text, got {value!r}")
+    raise ValueError(f"{name} must be a text, got {shown(value)}")
 
 
 def truth(name: str, value: object) -> bool:
     """Return a bool."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    raise ValueError(f"{name} must be true or false, got {value!r}")
+    raise ValueError(f"{name} must be true or false, got {shown(value)}")
 
 
 def count(name: str, value: object) -> int:
     """Return a whole number >= 0 that fits 64 bits."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and 0 <= value < 2**63:
         return int(value)
-    raise ValueError(f"{name} must be a whole number >= 0, got {value!r}")
+    raise ValueError(f"{name} must be a whole number >= 0, got {shown(value)}")
 
 
 def optional(check: Callable[[str, Any], T]) -> Callable[[str, Any], T | None]:
@@ -159,14 +168,14 @@ def each(name: str, values: object, check: Callable[[str, Any], T]) -> list[T]:
     if isinstance(values, np.ndarray):
         values = values.tolist()
     if not isinstance(values, list | tuple):
-        raise ValueError(f"{name} must be a list, got {values!r}")
+        raise ValueError(f"{name} must be a list, got {shown(values)}")
     return [check(f"{name}[{i}]", value) for i, value in enumerate(values)]
 
 
 def json_object(name: str, value: object) -> dict[str, Any]:
     """Return a copy of a mapping in JSON's own types, so that it comes back as it is here."""
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a mapping, got {value!r}")
+        raise ValueError(f"{name} must be a mapping, got {shown(value)}")
     return {
         text(f"a key of {name}", key): _json_value(f"{name}.{key}", entry)
         for key, entry in value.items()

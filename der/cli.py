@@ -673,6 +673,25 @@ def bench(
     run(None if json is None else File(json), quick=quick)
 
 
+@app.command()
+def stress(
+    quick: Annotated[bool, typer.Option("--quick", help="120 cases, under a minute.")] = False,
+    long: Annotated[bool, typer.Option("--long", help="10,000 cases, about an hour.")] = False,
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write the summary here.")] = None,
+) -> None:
+    """Try to break both solvers, and count what has no named reason."""
+    with _options_named():
+        if quick and long:
+            raise ValueError("quick cannot be given together with --long, got both")
+        if json is not None:
+            check_writable("json", File(json))
+        from validation.stress import stress as run
+
+        summary = run("long" if long else "quick", None if json is None else File(json))
+    show(str(summary))
+    raise typer.Exit(130 if summary.interrupted else 0)
+
+
 # --- From the scene to the files -------------------------------------------------------------
 
 

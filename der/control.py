@@ -253,7 +253,7 @@ def _found(piece: Sector, wanted: Wanted, step: Step, here: Visit) -> tuple[list
     own = replace(piece, classes={_own_class(piece): (1, all_modes(piece.held))})
     asked = replace(wanted, stability=True)
     found, ended = special_points(own, asked, step, replace(here, index=(0,)))
-    return [replace(one, index=None) for one in found], ended
+    return [replace(one, index=None, sides=None) for one in found], ended
 
 
 def _own_class(piece: Sector) -> str:

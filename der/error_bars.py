@@ -130,6 +130,8 @@ def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
     for k, (low, high) in enumerate(zip(before, after, strict=True)):
         if places[k] is None:
             at[k] = min(max(at[k], low), high)  # known on N edges only: among its old neighbours
+        if at[k] > at[-1]:
+            continue  # a branch or contact point that has moved beyond the end of the path
         if fixed[k] or places[k] is None or low < at[k] < high:
             kept.append(k)
     return sorted(kept, key=lambda k: at[k])

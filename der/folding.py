@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from der.assembly import assemble
-from der.checks import counts
+from der.checks import counts, shown
 from der.control import follow_angle, follow_moment
 from der.equilibrium import equilibrium
 from der.error_bars import error_bars
@@ -65,6 +65,8 @@ def fold(
     Interrupted
         At Ctrl-C; has the path so far.
     """
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a der.Scene, got {shown(scene)}")
     piece = _piece(scene, scene.n_edges, scene.sector)
     until_folded = scene.until == "folded"
     beyond = scene.gamma_max > math.pi
@@ -134,6 +136,12 @@ def _with_error_bars(
         most = math.ceil(last / EIGHTH)
         asked |= {k * EIGHTH for k in range(-most, most + 1)}
     bars = error_bars([piece, *coarse], visits, asked, tolerance=scene.tolerance)
+    turned = [k for k, visit in enumerate(visits) if visit.kind == "fold" and k in bars.order]
+    place = {k: i for i, k in enumerate(bars.order)}
+    for k, visit in enumerate(visits):
+        passed = k in place and any((place[f] < place[k]) != (f < k) for f in turned)
+        if visit.kind == "contact" and passed:
+            visits[k] = replace(visit, index=None)  # it lay on the other side of the fold
     visits[:] = [visits[k] for k in bars.order]
     path = record("done")
 

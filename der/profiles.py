@@ -8,7 +8,7 @@ little that closes it, and mirrored.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from der.checks import checked_array
+from der.checks import checked_array, shown
 from der.outline import (
     LARGEST_TURN,
     Array,
@@ -80,7 +80,7 @@ def _checked_bends(arc_length: ArrayLike | None, curvature: ArrayLike | None) ->
             f"arc_length and curvature must be of one length >= 2, got {len(s)} and {len(k)}"
         )
     if s[0] != 0 or s[-1] <= 0 or np.any(np.diff(s) < 0):
-        raise ValueError(f"arc_length must start at 0 and not decrease, got {s}")
+        raise ValueError(f"arc_length must start at 0 and not decrease, got {shown(s)}")
     turn = np.diff(s) * np.maximum(np.abs(k[:-1]), np.abs(k[1:]))
     if np.max(turn) > LARGEST_TURN:
         raise ValueError(

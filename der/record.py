@@ -347,4 +347,4 @@ def _build(kind: Callable[..., Any], where: str, entries: Any) -> Any:
     try:
         return kind(**entries)
     except (TypeError, ValueError) as problem:  # TypeError: "... missing 1 required ...: 'solver'"
-        raise ValueError(f"{where}: {problem}") from problem
+        raise ValueError(f"{where}: {' '.join(str(problem).split())}") from problem

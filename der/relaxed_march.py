@@ -24,6 +24,7 @@ from der.step import Stuck, Tally
 
 RISE = math.pi / 64.0  # rad, step of a march by dynamic relaxation alone
 RESOLUTION = 1e-6  # rad, of where such a march finds a snap
+CLOSE = 1e-9  # rad: states nearer than this tell no rates by their differences
 _MISS = 0.1  # rad, root mean square: a state further from the extrapolation has snapped
 
 
@@ -97,6 +98,8 @@ class _Walk:
         """Loads to relax at, in the order of the march from ``first``."""
         last = self.wanted.load_max
         low, high = min(first, last), max(first, last)
+        if high - low > self.wanted.most_steps * self.rise:
+            raise Stuck(f"the march would not end within {self.wanted.most_steps} steps")
         grid = [k * self.rise for k in range(math.ceil(low / self.rise), int(high / self.rise) + 1)]
         asked = self.wanted.targets
         if asked is None:
@@ -123,8 +126,10 @@ def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Visit]:
         walk.tally.steps += 1
         if _went_on(piece, trail, found):
             loads.pop()
-            trail = [*trail[-2:], _rested(piece, trail, found)]
-            yield Visit(trail[-1])
+            rested = _rested(piece, trail, found)
+            if abs(rested.state.load - trail[-1].state.load) > CLOSE:
+                trail = [*trail[-2:], rested]
+            yield Visit(rested)
         elif abs(loads[-1] - trail[-1].state.load) > RESOLUTION:
             loads.append(0.5 * (trail[-1].state.load + loads[-1]))
         else:
@@ -179,9 +184,12 @@ def _rested(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> Equilibr
         last = trail[-1]
         step = _change(piece, last.state, found.state)
         norm = math.sqrt(dot(piece.body, step, step))
-        tangent = Direction(step.q / norm, step.force / norm, step.load / norm)
-        slope = (found.moment - last.moment) / step.load
-        if len(trail) > 1:
+        tangent, slope = last.tangent, last.slope  # where the two are one state
+        apart = abs(step.load) > CLOSE
+        if apart:
+            tangent = Direction(step.q / norm, step.force / norm, step.load / norm)
+            slope = (found.moment - last.moment) / step.load
+        if apart and len(trail) > 1:
             before = trail[-2]
             older = (last.moment - before.moment) / (last.state.load - before.state.load)
             slope += step.load * (slope - older) / (found.state.load - before.state.load)
@@ -223,23 +231,28 @@ def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
 
 def _with_limits(walk: _Walk, states: Iterator[Visit]) -> Iterator[Visit]:
     """The visits with the limits of the moment put in, each state a step late."""
-    window: list[Visit] = []
+    window: list[list[Visit]] = []  # each with those that are all but the same state
     for one in states:
         if one.kind == "snap":
-            yield from window[1:]
+            for same in window[1:]:
+                yield from same
             window = []
-        window.append(one)
+        if window and abs(one.at.state.load - window[-1][0].at.state.load) <= CLOSE:
+            window[-1].append(one)
+        else:
+            window.append([one])
         if len(window) == 1:
             yield one
-        if len(window) < 3:
+        if len(window) < 3 or len(window[-1]) > 1:
             continue
-        a, b, c = (each.at for each in window)
-        turn = [window[1]]
+        a, b, c = (same[0].at for same in window)
+        turn = list(window[1])
         if (b.moment - a.moment) * (c.moment - b.moment) < 0.0:
             turn.append(_turning(walk, a, b, c))
         yield from sorted(turn, key=lambda v: v.at.state.load, reverse=c.state.load < b.state.load)
         window.pop(0)
-    yield from window[1:]
+    for same in window[1:]:
+        yield from same
 
 
 def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Visit:

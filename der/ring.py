@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from der.checks import checked_number
+from der.checks import checked_number, shown
 from der.outline import Array, Ellipse, Outline, arc, closed_curve, straight
 from der.profiles import knots_of, profile_of_knots, profile_of_points
 
@@ -117,9 +117,13 @@ class Ring:
 
     def _around(self, s: ArrayLike) -> tuple[Array, Array]:
         """Return full turns done, and the arc length since the last."""
-        s = np.asarray(s, dtype=float)
+        given = np.asarray(s) if not isinstance(s, list | tuple) else np.array(s, dtype=object)
+        try:
+            s = given.astype(float) if given.dtype.kind in "iufO" else np.array(np.nan)
+        except (TypeError, ValueError, OverflowError):
+            s = np.array(np.nan)
         if not np.all(np.isfinite(s)):
-            raise ValueError(f"s must be finite arc lengths, got {s}")
+            raise ValueError(f"s must be finite arc lengths, got {shown(given)}")
         turns = np.floor(s / self.length)
         return turns, s - turns * self.length
 
@@ -414,5 +418,5 @@ def _fillet(r_over_a: object, largest: float, which: str) -> float:
 def _oriented(b: float, twist_axis: object) -> tuple[float, float]:
     """Return the half extents along E2 and E3 (the twisting axis) of a ring with a = 1."""
     if not isinstance(twist_axis, str) or twist_axis not in ("x", "y"):
-        raise ValueError(f"twist_axis must be 'x' or 'y', got {twist_axis!r}")
+        raise ValueError(f"twist_axis must be 'x' or 'y', got {shown(twist_axis)}")
     return (1.0, b) if twist_axis == "x" else (b, 1.0)

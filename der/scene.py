@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from numbers import Integral
 
-from der.checks import checked_number, one_of, positive, truth
+from der.checks import checked_number, one_of, positive, shown, truth
 from der.ring import Ring
 from der.sections import Section
 
@@ -88,11 +88,13 @@ class Scene:
 
     def __post_init__(self) -> None:
         if not isinstance(self.ring, Ring):
-            raise ValueError(f"ring must be a der.Ring such as der.circle(), got {self.ring!r}")
+            raise ValueError(
+                f"ring must be a der.Ring such as der.circle(), got {shown(self.ring)}"
+            )
         if not isinstance(self.section, Section):
             raise ValueError(
                 f"section must be a der.Section such as der.rectangular_section(4.0), "
-                f"got {self.section!r}"
+                f"got {shown(self.section)}"
             )
         object.__setattr__(self, "n_edges", _whole("n_edges", self.n_edges))
         sector_name(self.ring, self.sector, self.n_edges)
@@ -110,11 +112,10 @@ class Scene:
         one_of("stretch", self.stretch, STRETCH)
         if self.until is not None:
             one_of("until", self.until, ("folded",))
-        positive("gamma_max", self.gamma_max)
-        positive("a_over_t", self.a_over_t)
-        if self.a_over_t > THINNEST:
-            raise ValueError(f"a_over_t must be at most {THINNEST:g}, got {self.a_over_t!r}")
-        positive("tolerance", self.tolerance)
+        for name in ("gamma_max", "a_over_t", "tolerance"):
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
+        if not 1.0 <= self.a_over_t <= THINNEST:
+            raise ValueError(f"a_over_t must be from 1 to {THINNEST:g}, got {self.a_over_t!r}")
         if self.tolerance > 1e-4:
             raise ValueError(f"tolerance must be at most 1e-4, got {self.tolerance!r}")
         if self.until == "folded" and self.gamma_max < math.pi:
@@ -146,11 +147,14 @@ class Scene:
     def _check_save_at(self, values: Sequence[float]) -> None:
         last = math.inf if self.until == "folded" else self.gamma_max
         allowed = "numbers >= 0" if last == math.inf else f"numbers from 0 to gamma_max = {last}"
-        if isinstance(values, str) or not isinstance(values, Iterable):
-            raise ValueError(f"save_at must be a sequence of {allowed}, got {values!r}")
+        try:
+            given = None if isinstance(values, str) else list(values)
+        except TypeError:  # nothing to iterate over, or an array of no dimension
+            given = None
+        if given is None:
+            raise ValueError(f"save_at must be a sequence of {allowed}, got {shown(values)}")
         gammas = {
-            checked_number("save_at", gamma, allowed, lambda g: 0.0 <= g <= last)
-            for gamma in values
+            checked_number("save_at", gamma, allowed, lambda g: 0.0 <= g <= last) for gamma in given
         }
         object.__setattr__(self, "save_at", tuple(sorted(gammas)))
 
@@ -182,7 +186,7 @@ def sector_name(ring: Ring, name: str, n_edges: int) -> str:
     if n_edges % divisor or not FEWEST_EDGES <= n_edges <= MOST_EDGES:
         raise ValueError(
             f"n_edges must be from {FEWEST_EDGES} to {MOST_EDGES} and divisible by {divisor}"
-            f" for the sector {name!r}, got {n_edges}"
+            f" for the sector {name!r}, got {shown(n_edges)}"
         )
     return name
 
@@ -210,5 +214,5 @@ def meshes(n_edges: int, sector: str) -> tuple[int, int, int]:
 
 def _whole(name: str, value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise ValueError(f"{name} must be a whole number, got {value!r}")
+        raise ValueError(f"{name} must be a whole number, got {shown(value)}")
     return int(value)

@@ -6,7 +6,6 @@ Free of kernels, like the record that they belong to; they are saved by themselv
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
@@ -139,8 +138,9 @@ class Shapes:
                     places = arrays.get("arc_length")
                     x, frames = arrays["x"], arrays["frames"]
                     return cls(x, frames, _falls(arrays), _softest(arrays), places)
-            except (ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as problem:
-                raise ValueError(f"{os.fspath(path)}: no shapes in it: {problem}") from problem
+            except Exception as problem:  # zipfile and numpy raise some ten classes on broken files
+                words = " ".join(str(problem).split())
+                raise ValueError(f"{os.fspath(path)}: no shapes in it: {words}") from problem
 
 
 def _keep(record: object, called: str, name: str, shape: tuple[int | str, ...]) -> Array:

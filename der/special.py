@@ -24,6 +24,7 @@ from der.step import ROOT, Step, root
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-4  # of s, for the passage of a strand: an ideal ring asks for no more
 _BRIEF = 1e-3  # of s, between a passage and its reversal
+_TURN = 1e-4  # of a step: between a fold and the places where dgamma/ds has its two signs
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 # of the softest torsion of a ring, GJ (2 pi/L)^2: within a step a mode's stiffness was seen to
 # bulge by 0.002 of it at the median and by 0.06 in one of a hundred
@@ -95,10 +96,10 @@ def special_points(
     line = sorted([_Mark(0.0, here), *marks], key=lambda m: m.s)
     line += _limits(step, line)
     line.sort(key=lambda m: m.s)
-    if wanted.stability:
-        line = _index_changes(piece, wanted, step, line)
     if wanted.contacts:
         line = _passages(piece, wanted, step, line, ended)
+    if wanted.stability:  # the index at contacts is a sample, too
+        line = _index_changes(piece, wanted, step, line)
     return [m.visit for m in line[1:]], ended
 
 
@@ -119,7 +120,7 @@ def _slowest(length: float, jump: float, first: float, last: float) -> list[floa
 
     Two turns that lie close together show at the ends of an interval only by this.
     """
-    if first * last <= 0.0:
+    if first * last <= 0.0 or length <= 0.0:  # two marks in one place
         return []
     c2 = 3.0 * jump / length - 2.0 * first - last
     c3 = first + last - 2.0 * jump / length
@@ -288,13 +289,23 @@ def _branches(
     if low[1] == high[1]:
         return []
     if high[0] - low[0] < 2.0 * ROOT:
-        return [_Mark(low[0], Visit(step.at(low[0]), "branch", details={"symmetry": label}))]
+        at = step.at(low[0])
+        if c == 0 and _turns(step, low[0]):  # one of two folds that the cubic did not show
+            return [_Mark(low[0], Visit(at, "fold"))]
+        return [_Mark(low[0], Visit(at, "branch", details={"symmetry": label}))]
     s = 0.5 * (low[0] + high[0])
     middle = (s, raw_index(piece.body, piece.held, modes, step.at(s).state))
     return [
         *_branches(piece, step, c, low, middle),
         *_branches(piece, step, c, middle, high),
     ]
+
+
+def _turns(step: Step, s: float) -> bool:
+    """Whether the load turns at ``s``; the tangent at a branch point itself tells nothing."""
+    away = _TURN * step.length
+    before, after = max(s - away, 0.0), min(s + away, step.length)
+    return step.at(before).tangent.load * step.at(after).tangent.load < 0.0
 
 
 def _passages(

@@ -133,11 +133,23 @@ class Step:
             except Stuck:
                 found = None
             if found is not None and self._near(found, s):
-                return s, found
+                # the load given, not the one that differences give, to the last bit
+                found = replace(found, state=found.state.but(load=load))
+                return min(max(self._place(found, s, step), low), high), found
         # close to a fold: the load is a bad coordinate there, s is not
         s = root(lambda t: self.at(t).state.load - load, low, high)
         found = self.at(s)
         return s, replace(found, state=found.state.but(load=load))
+
+    def _place(self, found: Equilibrium, s: float, guess: Direction) -> float:
+        """The s of a state found near ``guess`` at ``s``: where its own projection lies."""
+        state = moved(self.piece.held, self.start.state, guess)
+        q = np.zeros_like(self.jump.q)
+        q[:, :3] = rotation_vector(state.quat, found.state.quat)
+        if q.shape[1] == 4:
+            q[:, 3] = found.state.stretch - state.stretch
+        q[~self.piece.held.free] = 0.0
+        return s + dot(self.piece.body, self.start.tangent, Direction(q, guess.force, 0.0))
 
     def _near(self, found: Equilibrium, s: float) -> bool:
         """Whether a state found at given load lies where the cubic expects it."""
