@@ -46,7 +46,7 @@ def system(ring: der.Ring, h_over_t: float, nu: float = 0.3, **wants: Any) -> Co
 def path(
     ring: der.Ring, h_over_t: float, nu: float = 0.3, tolerance: float = 1e-8, **wants: Any
 ) -> der.Path:
-    """The path of a ring, solved once a session."""
+    """The path of a ring, solved once a run."""
     return solve(scene(ring, h_over_t, nu, **wants), tolerance=tolerance)
 
 

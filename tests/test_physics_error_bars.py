@@ -105,7 +105,7 @@ def test_folds(h_over_t, bound):
 def test_folded_state_stays_exact(h_over_t):
     """M = 0 and U = 4 pi alpha at pi: the three-covered polygon bends uniformly on every mesh.
 
-    Truth: truth.md, circular ring. An energy errs by the square of a residual.
+    The folded circle has k1 = 3 everywhere. An energy errs by the square of a residual.
     """
     _, bars = solved(h_over_t, 128)
     alpha = der.rectangular_section(h_over_t).alpha
@@ -122,7 +122,7 @@ def test_folded_state_has_no_error_to_speak_of(h_over_t):
 
 
 def slope_when_folded(h_over_t: float) -> float:
-    """DM/dgamma of the three-covered ring in closed form: truth.md, circular ring."""
+    """DM/dgamma of the three-covered ring in closed form (see `tests/test_physics_rings.py`)."""
     section = der.rectangular_section(h_over_t)
     alpha, beta, n = section.alpha, section.beta, 3
     a, b = (alpha * (n - 1) - n) / beta, alpha * (n - 1) - beta * n

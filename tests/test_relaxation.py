@@ -146,7 +146,7 @@ def test_dead_moment_stops_at_the_stop():
 
 
 def test_cantilever_under_a_dead_force():
-    """Bisshopp and Drucker: P L^2/EI = 1 deflects the tip by 0.3017208 L (truth.md).
+    """Bisshopp and Drucker: P L^2/EI = 1 deflects the tip by 0.3017208 L.
 
     Second order in the cell: 64 cells leave 1e-4.
     """
