@@ -195,11 +195,10 @@ def test_a_well_of_the_mesh_alone_has_no_barrier():
     assert "but for the mesh" in extrapolated.why[0]
 
 
-def test_forty_landscapes_take_a_few_seconds():
-    """Goal 5 s on a core of its own; 2 s measured, and three times that allowed here."""
+def test_the_barrier_to_open_exists_above_the_threshold_only_and_grows():
+    """Forty landscapes over h/t: none below 3.4 (3.4699 in the limit), increasing above 3.5."""
     curves = barriers_over(der.circle(), np.geomspace(1.0, 30.0, 40))
     assert len(curves.fold) == 40
-    assert curves.solve_s < 15.0
     assert np.isnan(curves.open[curves.h_over_t < 3.4]).all()
     assert np.all(np.diff(curves.open[curves.h_over_t > 3.5]) > 0.0)
 
