@@ -28,7 +28,7 @@ from der.sections import section
 from der.sector import Sector, free_ring, sector
 from der.shapes import Shapes
 from der.sites import sites
-from der.special import EIGHTH, Indices, Visit, Wanted, three_covered
+from der.special import EIGHTH, Visit, Wanted, full_index, three_covered
 from der.stability import all_modes, index
 from der.step import Stuck, Tally
 from der.unfinished import Interrupted, NotConverged, interrupts_between_states
@@ -199,7 +199,7 @@ def _record(
     message: str,
 ) -> Path:
     """The record of what was visited."""
-    indices = [_full_index(piece, visit.index) for visit in visits]
+    indices = [full_index(piece, visit.index) for visit in visits]
     moments = np.array([piece.moment(visit.at.moment) for visit in visits])
     points = tuple(_points(piece, visits))
     at_pi = mode = None
@@ -248,18 +248,6 @@ def _record(
     )
 
 
-def _full_index(piece: Sector, index: Indices | None) -> int | None:
-    """Index of the full ring: the sum over the classes, pairs counted twice."""
-    if index is None:
-        return None
-    total = 0
-    for (multiplicity, _), count in zip(piece.classes.values(), index, strict=True):
-        if count is None:
-            return None
-        total += multiplicity * count
-    return total
-
-
 def _moment_index(visit: Visit, held: int | None) -> int | None:
     """Index with the moment held: one more where dM/dgamma < 0; unknown where it vanishes."""
     if held is None or visit.kind == "limit":
@@ -274,7 +262,7 @@ def _points(piece: Sector, visits: list[Visit]) -> list[Point]:
         if not visit.kind:
             continue
         before, after = (
-            _full_index(piece, index) for index in visit.sides or (visit.index, visit.index)
+            full_index(piece, index) for index in visit.sides or (visit.index, visit.index)
         )
         at = visit.at
         numbers = (at.state.load, piece.moment(at.moment), piece.copies * at.energy)

@@ -24,7 +24,7 @@ from der.record import Path, Point, Timing, counts
 from der.rod import edges
 from der.scene import Scene, meshes
 from der.sector import Sector, sector
-from der.special import Indices, Visit, Wanted, three_covered, visit
+from der.special import Visit, Wanted, full_index, three_covered, visit
 from der.step import Stuck, Tally
 from der.unfinished import interrupts_between_states
 
@@ -179,7 +179,7 @@ def _followed(
 
 def rest_of(piece: Sector, whole: Sector | None, one: Visit, position: int) -> Rest:
     """What is known of a rest."""
-    held = total_index(piece, one.index)
+    held = full_index(piece, one.index)
     slope = piece.moment(one.at.slope)
     return Rest(
         gamma=one.at.state.load,
@@ -192,23 +192,11 @@ def rest_of(piece: Sector, whole: Sector | None, one: Visit, position: int) -> R
     )
 
 
-def total_index(piece: Sector, index: Indices | None) -> int | None:
-    """Index of the full ring: the sum over the symmetry classes, pairs counted twice."""
-    if index is None:
-        return None
-    total = 0
-    for (multiplicity, _), count in zip(piece.classes.values(), index, strict=True):
-        if count is None:
-            return None
-        total += multiplicity * count
-    return total
-
-
 def _path(
     scene: Scene, piece: Sector, visits: Sequence[Visit], timing: Timing, status: str, message: str
 ) -> Path:
     """The record of what was visited."""
-    held = [total_index(piece, one.index) for one in visits]
+    held = [full_index(piece, one.index) for one in visits]
     under_moment = [
         None if i is None or one.kind == "limit" else i + (one.at.slope < 0.0)
         for one, i in zip(visits, held, strict=True)
@@ -217,7 +205,7 @@ def _path(
     for k, one in enumerate(visits):
         if one.kind in _KINDS:
             before, after = (
-                total_index(piece, index) for index in one.sides or (one.index, one.index)
+                full_index(piece, index) for index in one.sides or (one.index, one.index)
             )
             numbers = (
                 one.at.state.load,

@@ -75,6 +75,18 @@ def visit(piece: Sector, wanted: Wanted, at: Equilibrium, **extra: object) -> Vi
     return Visit(at, index=known, stiffness=stiffness, **extra)  # type: ignore[arg-type]
 
 
+def full_index(piece: Sector, index: Indices | None) -> int | None:
+    """Index of the full ring: the sum over the classes, pairs counted twice."""
+    if index is None:
+        return None
+    total = 0
+    for (multiplicity, _), count in zip(piece.classes.values(), index, strict=True):
+        if count is None:
+            return None
+        total += multiplicity * count
+    return total
+
+
 @dataclass(frozen=True)
 class _Mark:
     """A visit and its place within a step."""

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
-from validation.figures.drawing import ONE_THREAD
+from validation.figures.drawing import one_thread_each
 
 
 class Workers(Protocol):
@@ -64,7 +64,7 @@ def workers(number: int | None = None, scheduler: str | None = None) -> Iterator
         raise ValueError(f"workers cannot be given together with a scheduler, got {number!r}")
     crew: Workers = Processes(_checked(number)) if scheduler is None else Cluster(scheduler)
     try:
-        with _one_thread_each():
+        with one_thread_each():
             yield crew
     except BaseException:
         crew.stop()
@@ -157,21 +157,6 @@ def _checked(number: int | None) -> int:
     if isinstance(number, bool) or not isinstance(number, int) or number < 1:
         raise ValueError(f"workers must be a whole number from 1, got {number!r}")
     return number
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Have processes that are started here compute on one thread."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _start() -> None:

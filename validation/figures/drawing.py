@@ -70,7 +70,7 @@ def draw(
         min(workers, len(figures)), multiprocessing.get_context("spawn"), _ignore_ctrl_c
     )
     try:
-        with _one_thread_each():
+        with one_thread_each():
             tasks = {pool.submit(figure, folder): name for name, figure in figures.items()}
         for task in _with_progress(tasks):
             problem = task.exception()
@@ -110,7 +110,7 @@ def _make(folder: FilePath) -> None:
 
 
 @contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
     """Have processes that are started here compute on one thread."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
