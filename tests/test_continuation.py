@@ -8,8 +8,8 @@ import pytest
 from bvp import system, visits
 
 import der
-from validation.collocation import collocation
-from validation.continuation import Tally, Visit, Wanted, follow, root
+from validation.collocation import Collocation, Error, collocation
+from validation.continuation import Stuck, Tally, Visit, Wanted, follow, root
 from validation.sectors import sector
 
 EIGHTH = math.pi / 8
@@ -113,6 +113,21 @@ def test_a_tolerance_between_two_meshes_is_reached():
         gammas.append(visit.at.gamma)
         assert count < 1000
     assert gammas[-1] == math.pi
+
+
+def test_an_error_that_more_intervals_do_not_lessen_is_called_rounding(monkeypatch):
+    floor = 1e-7
+    estimate = Collocation.error
+
+    def noisy(self, at):
+        error = estimate(self, at)
+        return Error(error.gamma + floor, error.moment, error.energy)
+
+    monkeypatch.setattr(Collocation, "error", noisy)
+    with pytest.raises(
+        Stuck, match=r"an error of .* on \d+ intervals, as on fewer: it is rounding"
+    ):
+        followed(der.circle(), 4.0, tolerance=1e-8)
 
 
 def test_a_path_that_turns_back_ends_at_minus_pi():

@@ -29,6 +29,8 @@ STRAIGHT = 0.01  # bulge of a step that is believed although its ends are orient
 MOST_STEPS = 2000
 FEWEST_INTERVALS, MOST_INTERVALS = 3, 4000
 REFIT = 4  # steps after which the mesh is fitted again
+IN_VAIN = 4.0  # times the intervals, which at order 8 leave 2e-5 of an error: where they leave
+REMAINS = 0.5  # half of it or more, what is left is rounding
 SAFETY = 0.25  # of the tolerance: the error aimed at
 ROOT = 1e-10  # of s: gamma at a fold, M at a limit are quadratic in it
 EIGHTH = math.pi / 8.0
@@ -187,6 +189,7 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
     yield Visit(here, error)
     bend: Direction | None = None  # rate of change of the tangent over the last step
     length, age = FIRST_STEP, 0
+    first: tuple[int, float] | None = None  # intervals and error that did not do for this step
     while True:
         if tally.steps >= MOST_STEPS:
             raise Stuck(f"the path has not ended after {tally.steps} steps")
@@ -204,12 +207,12 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
                 continue
             size = max(scales.largest(visit.at, visit.error) for visit in found)
         if size > wanted.tolerance:
-            if n >= _most(system):
-                raise Stuck(
-                    f"an error of {size:.2g} is left on {n} intervals at gamma = {here.gamma:.6f}"
-                )
+            n_here = len(here.mesh.h)
+            if first is None or not math.isfinite(first[1]):
+                first = n_here, size
+            _check_refinable(system, first, (n_here, size), here.gamma)
             # at least one more than asked for last: a mesh rounds to what its joints allow
-            n = min(max(n + 1, _refined(len(here.mesh.h), size, wanted.tolerance)), _most(system))
+            n = min(max(n + 1, _refined(n_here, size, wanted.tolerance)), _most(system))
             here = _refitted(system, tally, here, step.end, n)
             bend, length, age = None, step.length, 0
             continue
@@ -228,7 +231,7 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
             (b.p - a.p) / step.length,
             (b.gamma - a.gamma) / step.length,
         )
-        here, age = step.end, age + 1
+        here, age, first = step.end, age + 1, None
         if age >= REFIT:
             n = _refined(len(here.mesh.h), size, wanted.tolerance)
             here, bend, age = _refitted(system, tally, here, here, n), None, 0
@@ -237,14 +240,30 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
 def _flat(system: Collocation, wanted: Wanted) -> tuple[Solution, Error, int]:
     """The flat ring on a mesh fine enough, its error, and about how many intervals that has."""
     n = max(FEWEST_INTERVALS, len(system.sector.joints) - 1)
+    first: tuple[int, float] | None = None
     while True:
         found = system.flat(n)
         if isinstance(found, Failure):
             raise Stuck(f"the flat ring is no solution: {found.reason}")
         error = system.error(found)
-        if Scales(found).largest(found, error) <= wanted.tolerance or n >= _most(system):
+        size = Scales(found).largest(found, error)
+        if size <= wanted.tolerance:
             return found, error, n
+        if first is None or not math.isfinite(first[1]):
+            first = n, size
+        _check_refinable(system, first, (n, size), 0.0)
         n = min(2 * n, _most(system))
+
+
+def _check_refinable(
+    system: Collocation, first: tuple[int, float], last: tuple[int, float], gamma: float
+) -> None:
+    """Give up where more intervals are of no use: by intervals and errors of first and last try."""
+    n, size = last
+    in_vain = n >= IN_VAIN * first[0] and size > REMAINS * first[1]
+    if in_vain or n >= _most(system):
+        why = ", as on fewer: it is rounding," if in_vain else ""
+        raise Stuck(f"an error of {size:.2g} is left on {n} intervals{why} at gamma = {gamma:.6f}")
 
 
 def _most(system: Collocation) -> int:
