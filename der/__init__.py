@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from der.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.scene import Scene
     from der.sections import Scale, Section, rectangular_section, section
+    from der.states_record import RingState, States, Transition
+    from der.states_search import states
     from der.unfinished import Interrupted, NotConverged
 
 __all__ = [
@@ -23,9 +25,12 @@ __all__ = [
     "Path",
     "Point",
     "Ring",
+    "RingState",
     "Scale",
     "Scene",
     "Section",
+    "States",
+    "Transition",
     "circle",
     "ellipse",
     "fold",
@@ -33,6 +38,7 @@ __all__ = [
     "rectangle",
     "rectangular_section",
     "section",
+    "states",
     "triangle",
 ]
 
@@ -42,6 +48,8 @@ _HOME = {
     "ring": ("Ring", "circle", "ellipse", "profile", "rectangle", "triangle"),
     "scene": ("Scene",),
     "sections": ("Scale", "Section", "rectangular_section", "section"),
+    "states_record": ("RingState", "States", "Transition"),
+    "states_search": ("states",),
     "unfinished": ("Interrupted", "NotConverged"),
 }
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from der.ring import Ring
     from der.scene import Scene
     from der.sections import Section
+    from der.states_record import States
     from der.view_rerun import Live
 
 SHAPES = {  # and the options that go with each
@@ -590,6 +591,69 @@ def _draw_landscape(found: Any, file: File) -> None:
     view.save_figure(figure, file)
 
 
+@dataclass(frozen=True)
+class StatesOptions:
+    """Which states, and what is written."""
+
+    gamma: Annotated[
+        float | None, _number_option("Rotation of each grip, rad; the ring is free if not given.")
+    ] = None
+    count: Annotated[int, typer.Option(parser=_whole, help="States after which to stop.")] = 12
+    edges: Annotated[int, typer.Option(parser=_whole, help="Edges of the full ring.")] = 64
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write it here ('-': output).")] = (
+        None
+    )
+    plot: Annotated[str | None, typer.Option(metavar="F", help="Draw it: .png, .pdf, .svg.")] = None
+    out: Annotated[
+        str | None, typer.Option(metavar="DIR", help="Write states.json, .png and shapes.npz here.")
+    ] = None
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False
+
+
+@_command(RingOptions, StatesOptions)
+def states(ring: RingOptions, wanted: StatesOptions) -> int:
+    """Find the states of a ring, free or in its grips, and which of them falls to which."""
+    from der.scene import Scene
+
+    with _options_named():
+        scene = Scene(ring.ring(), ring.section(), n_edges=wanted.edges, a_over_t=ring.a_over_t)
+        written = targets(wanted.json, wanted.plot, None, wanted.out, stem="states")
+        from der.states_search import states as search
+
+        with _counted("states", wanted.count, quiet=wanted.quiet) as tick:
+            found = search(scene, gamma=wanted.gamma, count=wanted.count, progress=tick)
+    code = {"done": 0, "interrupted": 130}.get(found.status, 3)
+    if code:
+        file = written.setdefault("json", UNSAVED)
+        place = "on standard output" if file == OUTPUT else f"in {file}"
+        say(f"der: {found.message}; states that were found: {len(found)}, {place}")
+    return _write_states(found, written, code, quiet=wanted.quiet)
+
+
+def _write_states(found: States, written: dict[str, File], code: int, *, quiet: bool) -> int:
+    """Write states, their shapes and picture, say what there is to say; the exit code."""
+    from der.states_words import words
+
+    for name, file in written.items():
+        try:
+            if name == "plot" and len(found):
+                from der.view_states import figure_of_states, save_figure
+
+                save_figure(figure_of_states(found), file)
+            elif name == "shapes" and found.shapes is not None:
+                found.shapes.save(file)
+            elif name == "json" and file != OUTPUT:
+                found.save(file)
+        except (OSError, ValueError) as wrong:
+            say(f"der: could not write {file}: {wrong}")
+            code = code or 3
+    if written.get("json") == OUTPUT:
+        return code if show(found.to_json().rstrip()) else code or 3
+    if not quiet and not show(words(found)):
+        code = code or 3
+    return code
+
+
 PHASES = {  # the diagrams of each shape, that of a cube last
     "ellipse": ("fig3a",),
     "rectangle": ("fig5b", "fig5c", "fig5a"),
@@ -775,3 +839,18 @@ def _progress(scene: Scene, *, quiet: bool) -> Iterator[Callable[[float], object
             bar.update(task, completed=gamma, total=scene.gamma_max, description=text)
 
         yield tick
+
+
+@contextmanager
+def _counted(what: str, most: int, *, quiet: bool) -> Iterator[Callable[[int], object] | None]:
+    """A progress bar over things found, on a terminal only."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("loading kernels (compiled once, in half a minute)", total=most)
+        yield lambda found: bar.update(task, completed=found, description=f"{found} {what}")

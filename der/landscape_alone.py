@@ -10,6 +10,10 @@ A ring of uniform natural curvature has one more motion at no cost, where it is 
 shifts along the curve. On the mesh it costs next to nothing, and as the rigid rotations are taken
 out by one held frame, it is taken out by holding one unknown, that which it moves most. A null
 vector z is not in the hyperplane of such a condition, so the index is that of the other motions.
+A naturally straight rod as stiff one way as the other may also spin about its own tangents at no
+cost (the seventh mode of the isotropic ring), which is taken out likewise.
+
+Other supports serve as well, such as grips: they leave no motion without cost.
 """
 
 from __future__ import annotations
@@ -36,7 +40,7 @@ class Alone:
     """A configuration of the ring left alone, with the forces that balance it best."""
 
     body: Rod  # of the full ring
-    held: Supports  # closed, one frame held
+    held: Supports  # closed, one frame held; or its grips
     state: State
     residual: float  # largest entry of the gradient, GJ/a
 
@@ -49,16 +53,35 @@ class Alone:
     @property
     def zero_modes(self) -> int:
         """How many motions cost nothing, beyond rigid ones."""
-        return int(np.any(shift(self.body, self.state)))
+        return len(self._costless())
 
-    def pinned(self) -> Supports:
-        """The supports with one more unknown held where the material may shift at no cost."""
-        mode = np.abs(shift(self.body, self.state))
-        if not np.any(mode):
+    def pinned(self, least: float = _PLANAR) -> Supports:
+        """The supports with one more unknown held for each motion at no cost.
+
+        Motions that, but for rigid ones, move nothing by more than ``least`` do not count.
+        """
+        places = self._costless(least)
+        if not places:
             return self.held
         free = self.held.free.copy()
-        free[np.unravel_index(int(np.argmax(mode)), mode.shape)] = False
+        for place in places:
+            free[place] = False
         return self.held._replace(free=free)
+
+    def _costless(self, least: float = _PLANAR) -> list[tuple[int, int]]:
+        """For each motion at no cost an unknown that it moves: Gauss's elimination."""
+        if np.any(self.held.turn):
+            return []
+        places: list[tuple[int, int]] = []
+        rows: list[Array] = []
+        for mode in (shift(self.body, self.state), spin(self.body, self.state)):
+            for place, row in zip(places, rows, strict=True):
+                mode = mode - mode[place] / row[place] * row
+            j, i = divmod(int(np.argmax(np.abs(mode))), mode.shape[1])
+            if abs(mode[j, i]) > least:
+                places.append((j, i))
+                rows.append(mode)
+        return places
 
     def index(self) -> int | None:
         """Ways down; None where it is no equilibrium, or singular."""
@@ -79,17 +102,23 @@ def left_alone(piece: Sector, whole: Sector, state: State) -> Alone:
     return balance(whole.body, quat, stretch)
 
 
-def balance(body: Rod, quat: Array, stretch: Array) -> Alone:
-    """A configuration with the forces that balance it best, in least squares."""
-    held = free_ring(body)
-    system = assemble(body, held, quat, stretch, np.zeros(3), 0.0)
+def balance(
+    body: Rod, quat: Array, stretch: Array, held: Supports | None = None, load: float = 0.0
+) -> Alone:
+    """A configuration with the forces that balance it best, in least squares.
+
+    ``held`` are its supports, none but closure if not given, turned to ``load``.
+    """
+    held = free_ring(body) if held is None else held
+    nothing = np.zeros(len(held.target))
+    system = assemble(body, held, quat, stretch, nothing, load)
     free = held.free.reshape(-1)
     grad = system.grad.reshape(-1)[free]
-    border = system.border.reshape(-1, 3)[free]
+    border = system.border.reshape(len(free), -1)[free]
     force = -np.linalg.lstsq(border, grad, rcond=None)[0]
     gap = float(np.abs(system.gap).max())
     residual = max(float(np.abs(grad + border @ force).max()), gap)
-    return Alone(body, held, State(quat, stretch, force, 0.0), residual)
+    return Alone(body, held, State(quat, stretch, force, load), residual)
 
 
 def shift(body: Rod, state: State) -> Array:
@@ -107,3 +136,18 @@ def shift(body: Rod, state: State) -> Array:
     frames = rotation(state.quat)
     mode[:, :3] = rate - np.einsum("nji,j->ni", frames, frames[0] @ rate[0])
     return mode if float(np.abs(mode).max()) > _PLANAR else np.zeros((n, b))
+
+
+def spin(body: Rod, state: State) -> Array:
+    """Rates (n, b) at which frames turn when each spins about its tangent; 0 where that costs.
+
+    It does where the natural ring is bent or the section has a stiff and a weak side. Edge 0 is
+    kept where it is by a rigid rotation.
+    """
+    mode = np.zeros((body.n_edges, body.block))
+    stiff = body.stiffness
+    if abs(stiff[0] - stiff[1]) > _UNIFORM * stiff[0] or np.any(np.abs(body.rest) > _UNIFORM):
+        return mode
+    frames = rotation(state.quat)
+    mode[:, :3] = np.array([0.0, 0.0, 1.0]) - np.einsum("nji,j->ni", frames, frames[0][:, 2])
+    return mode

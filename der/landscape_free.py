@@ -80,7 +80,7 @@ def free_barrier(scene: Scene) -> Pass:
 def _pass(scene: Scene, pressed: list[int]) -> Pass:
     """The lowest way found on one mesh."""
     started = time.perf_counter()
-    rests, alone, twisting, why = _twisted(scene)
+    rests, alone, twisting, why = twisted(scene)
     found: list[_Found] = []
     if not why:
         end = rests[-1]
@@ -116,7 +116,7 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
     )
 
 
-def _twisted(scene: Scene) -> tuple[list[Rest], list[Alone], Barriers, str]:
+def twisted(scene: Scene) -> tuple[list[Rest], list[Alone], Barriers, str]:
     """Rests on the path of twisting, the same without grips, and why there is no pass."""
     piece, whole = scene_sector(scene, scene.sector), scene_sector(scene, "full")
     wanted = Wanted(

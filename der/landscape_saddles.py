@@ -19,7 +19,7 @@ from der.block_ldl import factor, solve_refined
 from der.equilibrium import Direction, Equilibrium, moved
 from der.frames import Array
 from der.landscape_alone import Alone, balance
-from der.rod import Rod
+from der.rod import Rod, State
 from der.stability import all_modes, softest_modes
 from der.supports import Supports
 
@@ -55,11 +55,11 @@ def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | N
     """
     here, mode = start, along
     if kick is not None:
-        here = _displaced(here, kick)
+        here = displaced(here, kick)
     for step in range(_STEPS):
         held = here.pinned()
         state = here.state
-        found = _newton(here.body, held, state.quat, state.stretch, state.force)
+        found = newton_step(here.body, held, state)
         if found is None:
             return None
         newton, grad = found
@@ -72,7 +72,7 @@ def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | N
         if np.sum(values < 0.0) == 1:
             chosen = int(np.argmin(values))
         mode = modes[chosen]
-        here = _displaced(here, _turned(here, newton, grad, values, modes, chosen))
+        here = displaced(here, _turned(here, newton, grad, values, modes, chosen))
         if not np.isfinite(here.residual):
             return None
     return None
@@ -121,32 +121,31 @@ def _system(rod, held, quat, stretch, force):
     return x, system.grad, solved
 
 
-def _newton(
-    body: Rod, held: Supports, quat: Array, stretch: Array, force: Array
-) -> tuple[Array, Array] | None:
+def newton_step(body: Rod, held: Supports, state: State) -> tuple[Array, Array] | None:
     """Newton's step and the gradient (n, b); None where the matrix is singular."""
-    step, grad, solved = _system(body, held, quat, stretch, force)
+    step, grad, solved = _system(body, held, state.quat, state.stretch, state.force)
     return (step[:, :, 0], grad) if solved else None
 
 
-def _displaced(here: Alone, w: Array) -> Alone:
-    """A ring displaced by ``w`` (n, b), closed again, with the forces that balance it best."""
-    nothing = np.zeros(len(here.held.target))
-    state = moved(here.held, here.state, Direction(w, nothing, 0.0))
-    free = here.held.free.ravel()
+def displaced(here: Alone, w: Array) -> Alone:
+    """A ring displaced by ``w`` (n, b), on its conditions again, with the best forces."""
+    held, load = here.held, here.state.load
+    nothing = np.zeros(len(held.target))
+    state = moved(held, here.state, Direction(w, nothing, 0.0))
+    free = held.free.ravel()
     for _ in range(8):
-        system = assemble(here.body, here.held, state.quat, state.stretch, nothing, 0.0)
+        system = assemble(here.body, held, state.quat, state.stretch, nothing, load)
         if float(np.abs(system.gap).max()) < 1e-12:
             break
         border = system.border.reshape(len(free), -1)[free]
-        back = np.zeros(here.held.free.shape)
-        back[here.held.free] = border @ np.linalg.solve(border.T @ border, -system.gap)
-        state = moved(here.held, state, Direction(back, nothing, 0.0))
-    return balance(here.body, state.quat, state.stretch)
+        back = np.zeros(held.free.shape)
+        back[held.free] = np.linalg.lstsq(border.T, -system.gap, rcond=None)[0]
+        state = moved(held, state, Direction(back, nothing, 0.0))
+    return balance(here.body, state.quat, state.stretch, held, load)
 
 
 def _polished(here: Alone, steps: int) -> Climb:
     """The equilibrium next to it, and its index with all that it leaves free."""
     at = here.polished()
-    alone = balance(here.body, at.state.quat, at.state.stretch)
+    alone = balance(here.body, at.state.quat, at.state.stretch, here.held, here.state.load)
     return Climb(alone, at, alone.index() if at.converged else None, steps)

@@ -49,21 +49,26 @@ def _errors(path: Path) -> str:
 
 def headline(path: Path) -> str:
     """Ring, section and mesh in one line."""
+    return titled(path.ring, path.section, path.numerics)
+
+
+def titled(ring: Mapping[str, Any], section: Mapping[str, Any], numerics: Mapping[str, Any]) -> str:
+    """Ring, section and mesh of a record in one line."""
     parameters = ", ".join(
         f"{name.replace('_over_', '/').replace('_', ' ')} {value:g}"
-        for name, value in path.ring.items()
+        for name, value in ring.items()
         if isinstance(value, int | float)
     )
-    ring = f"{path.ring['shape']} ({parameters})" if parameters else f"{path.ring['shape']}"
-    if path.ring.get("twist_axis") == "y":
-        ring += " about y"
-    section = f"alpha {path.section['alpha']:.6g}, beta {path.section['beta']:.6g}"
-    if path.section.get("h_over_t") is not None:
-        nu = path.section.get("nu")
+    words = f"{ring['shape']} ({parameters})" if parameters else f"{ring['shape']}"
+    if ring.get("twist_axis") == "y":
+        words += " about y"
+    bar = f"alpha {section['alpha']:.6g}, beta {section['beta']:.6g}"
+    if section.get("h_over_t") is not None:
+        nu = section.get("nu")
         given = "" if nu is None else f", nu {nu:g}"
-        section = f"h/t {path.section['h_over_t']:g}{given} ({section})"
-    edges = path.numerics.get("n_edges")  # a boundary-value solution has none
-    return f"{ring}, {section}" + ("" if edges is None else f", {edges} edges")
+        bar = f"h/t {section['h_over_t']:g}{given} ({bar})"
+    edges = numerics.get("n_edges")  # a boundary-value solution has none
+    return f"{words}, {bar}" + ("" if edges is None else f", {edges} edges")
 
 
 def mode_in_words(mode: Mode) -> str:

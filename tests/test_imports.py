@@ -28,7 +28,7 @@ ROOMS = {
         "sections",
         "scene",
     ),
-    "answer": ("files", "shapes", "record", "unfinished", "landscape_record"),
+    "answer": ("files", "shapes", "record", "unfinished", "landscape_record", "states_record"),
     "kernels": ("frames", "strain", "dense", "block_ldl", "linking", "assembly"),
     "engine": (
         "rod",
@@ -62,11 +62,17 @@ ROOMS = {
         "landscape_saddles",
         "landscape_free",
         "landscape_over",
+        "states_images",
+        "states_deflation",
+        "states_starts",
+        "states_basins",
+        "states_measures",
+        "states_search",
     ),
-    "film": ("curve", "film", "captions", "ribbon", "panel"),
+    "film": ("curve", "film", "captions", "ribbon", "flat_ribbon", "panel"),
     "layout": ("view_layout",),
-    "views": ("summary", "view_plots", "view_rerun", "view_landscape"),
-    "roof": ("output", "landscape_words", "cli", "__main__"),
+    "views": ("summary", "view_plots", "view_rerun", "view_landscape", "view_states"),
+    "roof": ("output", "landscape_words", "states_words", "cli", "__main__"),
 }
 # What each room may import from besides itself.
 BELOW = {
@@ -264,7 +270,9 @@ def test_only_commands_import_validation_and_scenarios():
             {
                 "der/view_landscape.py",
                 "der/view_plots.py",
+                "der/view_states.py",
                 "scenarios/hysteresis_plot.py",
+                "scenarios/states_plot.py",
                 "validation/comparison_plot.py",
                 "validation/figures/canvas.py",
                 "validation/packing_figures.py",

@@ -1,0 +1,137 @@
+r"""The states of a circular ring, free in space, over its natural curvature: h/t = 2.
+
+A bar bent to a circle of curvature kappa0 and joined to a ring of curvature 1 may lie flat, cover
+itself twice or three times, be turned inside out or lie in a figure eight, at any kappa0: all are
+states, with the energies pi alpha (n - kappa0)^2 of n covers and that of a planar elastica. How
+many ways lead down from them changes at thresholds that are known in closed form (`ways_down`); the
+states in space between them are not, and are found.
+
+    python -m scenarios.states_of_natural_curvature [DIR]
+
+writes states_K.json and .png for a few natural curvatures K, and states.csv and states.png over all
+of them, to DIR (default: out/states_of_natural_curvature). On import it solves one ring and the
+thresholds.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+import der
+from der.sector import sector
+from der.stability import all_modes, raw_index
+from der.states_starts import covered
+from scenarios.output import folder
+
+H_OVER_T = 2.0
+SPAN = (0.0, 4.0)  # of the natural curvature
+COVERS = (1, 2, 3)
+SCAN = 33  # natural curvatures between which thresholds are sought
+EXACT = 1e-9  # a bisection's last bracket
+SHOWN = (0.0, 1.0, 2.0, 3.0)  # natural curvatures of which all is drawn
+
+bar = der.rectangular_section(H_OVER_T)
+
+
+def ways_down(n: int, kappa0: float, alpha: float, beta: float) -> int:
+    """Index of the n-covered circle in the continuum.
+
+    In Fourier mode m, rotations (a2 cos m s, a3 sin m s) about d2 and d3, the second variation is
+    (beta m^2 + n^2 - c n, m (n (1 + beta) - c); .., m^2 + beta n^2 - c n), c = alpha (n - kappa0),
+    once more with cosine and sine exchanged. Its determinant is beta (m^2 - n^2)(m^2 - p^2) with
+    p^2 = (c - n)(c - beta n)/beta: at m = n one eigenvalue is 0, of a rigid rotation, and the other
+    the trace. The bar flips, m = 0, where c > beta n.
+    """
+    c = alpha * (n - kappa0)
+    p_squared = (c - n) * (c - beta * n) / beta
+    count = int(c > beta * n)
+    most = n + math.ceil(math.sqrt(max(p_squared, 0.0))) + math.ceil(abs(c)) + 1
+    for m in range(1, most):
+        determinant = (m * m - n * n) * (m * m - p_squared)
+        trace = (beta + 1.0) * (m * m + n * n) - 2.0 * c * n
+        if m == n:
+            count += 2 * (trace < 0.0)
+        elif determinant < 0.0:
+            count += 2
+        elif determinant > 0.0 and trace < 0.0:
+            count += 4
+    return count
+
+
+def index_on_mesh(n: int, kappa0: float, n_edges: int = 64) -> int:
+    """The same of the discrete ring; at a threshold, by the signs of the pivots alone."""
+    alone = covered(sector(der.circle(kappa0), bar, n_edges, name="full"), n)
+    return raw_index(alone.body, alone.held, all_modes(alone.held), alone.state)
+
+
+def thresholds(n: int, index: Callable[[int, float], int]) -> Iterator[float]:
+    """Natural curvatures in SPAN at which the index of the n-covered circle changes."""
+    grid = np.linspace(*SPAN, SCAN).tolist()
+    for low, high in pairwise(grid):
+        before = index(n, low)
+        if before == index(n, high):
+            continue
+        a, b = low, high
+        while b - a > EXACT:
+            middle = 0.5 * (a + b)
+            a, b = (middle, b) if index(n, middle) == before else (a, middle)
+        yield 0.5 * (a + b)
+
+
+def in_the_continuum(n: int, kappa0: float) -> int:
+    """`ways_down` of the bar at hand."""
+    return ways_down(n, kappa0, bar.alpha, bar.beta)
+
+
+def states_at(kappa0: float, count: int = 12) -> der.States:
+    """The states of the ring with a natural curvature."""
+    return der.states(der.Scene(der.circle(kappa0), bar), count=count)
+
+
+found = states_at(1.0, count=8)
+exact = {n: list(thresholds(n, in_the_continuum)) for n in COVERS}
+on_mesh = {
+    edges: {n: list(thresholds(n, partial(index_on_mesh, n_edges=edges))) for n in COVERS}
+    for edges in (32, 64)
+}
+
+
+def main() -> None:
+    """Search over the natural curvature, draw, and say how far the thresholds are off."""
+    from der.view_states import figure_of_states, save_figure
+    from scenarios.states_plot import figure_over_curvature
+
+    place = folder("states_of_natural_curvature")
+    sweep = []
+    for kappa0 in np.linspace(*SPAN, 17).tolist():
+        one = states_at(kappa0)
+        sweep.append((kappa0, one))
+        print(f"natural curvature {kappa0:g}: {len(one)} states, {len(one.minima)} minima")
+        if kappa0 in SHOWN:
+            one.save(place / f"states_{kappa0:g}.json")
+            save_figure(figure_of_states(one), place / f"states_{kappa0:g}.png")
+    with (place / "states.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["natural_curvature", "name", "energy", "index", "needs_cut"])
+        for kappa0, one in sweep:
+            rows.writerows([kappa0, s.name, s.energy, s.index, s.needs_cut] for s in one.states)
+    save_figure(figure_over_curvature(sweep, bar, exact), place / "states.png")
+    for n in COVERS:
+        for k, truth in enumerate(exact[n]):
+            fine, coarse = on_mesh[64][n][k], on_mesh[32][n][k]
+            limit = fine + (fine - coarse) / 3.0
+            print(
+                f"{n} covers, threshold {truth:.6f}: {fine - truth:+.1e} on 64 edges, "
+                f"{limit - truth:+.1e} extrapolated from 32 and 64"
+            )
+    print(f"written to {place}")
+
+
+if __name__ == "__main__":
+    main()
