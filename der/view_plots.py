@@ -1,7 +1,6 @@
 """A path as one picture: snapshots of the ring above M(gamma) and U(gamma).
 
-The only file that imports matplotlib; figures are objects of their own, so that nothing global
-changes and no display is needed.
+Figures are objects of their own, so that nothing global changes and no display is needed.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from der.curve import SNAP, sides, smooth, stretches
 from der.files import FilePath, write_whole
+from der.projection import HALF_WIDTH, seen
 from der.record import Mode, Path
 from der.shapes import Shapes
 
@@ -49,12 +49,7 @@ MARKS = {  # label, marker, size
 
 UNITS = {"vertex_angle": "°"}  # of a ring's parameters
 LETTERS = "ABCDEF"  # one for each snapshot
-ACROSS = 240  # quadrilaterals along a ribbon
 CAPTION = 0.82  # room for what stands below a ribbon, of the row's height
-HALF_WIDTH = 0.085  # of a ribbon, over the flat ring's mean radius: exaggerated, to be seen
-FRONT, BACK, GRIP = (0.40, 0.67, 0.88), (0.96, 0.76, 0.46), (0.16, 0.16, 0.16)
-CAMERA = np.array([0.80, 0.45, 0.40])  # the ring lies in the plane of the last two axes
-LIGHT = np.array([0.75, -0.30, 0.60])
 
 
 def figure_of_path(path: Path) -> Figure:
@@ -280,7 +275,7 @@ def _draw_ribbons(row: Axes, shapes: Shapes, gamma: Array, chosen: list[int]) ->
     x, frames = shapes.x, shapes.frames
     length = float(np.linalg.norm(np.diff(x[0], axis=0, append=x[0][:1]), axis=1).sum())
     width = HALF_WIDTH * length / (2 * math.pi)
-    ribbons = [_ribbon(x[k], frames[k, :, 0], width) for k in chosen]
+    ribbons = [seen(x[k], frames[k, :, 0], width) for k in chosen]
     spans = np.array([np.ptp(corners.reshape(-1, 2), axis=0) for corners, _ in ribbons])
     tall = 1.06 * spans[:, 1].max()
     slot = max(1.12 * spans[:, 0].max(), CAPTION * tall)
@@ -297,41 +292,3 @@ def _draw_ribbons(row: Axes, shapes: Shapes, gamma: Array, chosen: list[int]) ->
     row.set_ylim(-0.62 * tall, 0.5 * tall)
     row.set_aspect("equal")
     row.set_axis_off()
-
-
-def _ribbon(x: Array, d1: Array, width: float) -> tuple[Array, Array]:
-    """Return projected quadrilaterals (m, 4, 2), far ones first, and their colours (m, 3).
-
-    Vertex j joins edges j and j + 1; the grips sit on the middles of the edges 0 and N/2.
-    """
-    from scipy.interpolate import CubicSpline
-
-    n = len(x)
-    nodes = np.concatenate([x, d1 + np.roll(d1, -1, axis=0)], axis=1)
-    curve = CubicSpline(np.arange(n + 1), np.append(nodes, nodes[:1], axis=0), bc_type="periodic")
-    points = curve(np.arange(ACROSS + 1) * n / ACROSS - 0.5)
-    centre, across = points[:, :3], points[:, 3:]
-    across = width * across / np.linalg.norm(across, axis=1, keepdims=True)
-    lines = centre + np.multiply.outer([-1.0, -0.84, 0.84, 1.0], across)  # (4, ACROSS + 1, 3)
-    corners = np.stack([lines[:-1, :-1], lines[:-1, 1:], lines[1:, 1:], lines[1:, :-1]], axis=2)
-
-    towards, right, up = _camera()
-    normal = np.cross(np.diff(centre, axis=0), across[1:] + across[:-1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    shade = 0.62 + 0.38 * np.abs(normal @ (LIGHT / np.linalg.norm(LIGHT)))
-    colour = np.where((normal @ towards > 0)[:, None], FRONT, BACK)
-    from_grip = np.abs((np.arange(ACROSS) + 0.5 + ACROSS / 4) % (ACROSS / 2) - ACROSS / 4)
-    colour = np.where((from_grip < ACROSS / 80)[:, None], GRIP, colour) * shade[:, None]
-    colours = np.stack([0.55 * colour, colour, 0.55 * colour])  # darker along the two rims
-
-    corners, colours = corners.reshape(-1, 4, 3), colours.reshape(-1, 3)
-    order = np.argsort(corners.mean(axis=1) @ towards)
-    return (corners @ np.stack([right, up], axis=1))[order], colours[order]
-
-
-def _camera() -> tuple[Array, Array, Array]:
-    """Return the directions to the camera, to its right and up; the twisting axis is upright."""
-    towards = CAMERA / np.linalg.norm(CAMERA)
-    right = np.cross([0.0, 0.0, 1.0], towards)
-    right /= np.linalg.norm(right)
-    return towards, right, np.cross(towards, right)

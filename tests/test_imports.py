@@ -63,9 +63,16 @@ ROOMS = {
         "landscape_free",
         "landscape_over",
     ),
-    "film": ("curve", "film", "captions", "ribbon", "panel"),
-    "layout": ("view_layout",),
-    "views": ("summary", "view_plots", "view_rerun", "view_landscape"),
+    "film": ("curve", "film", "captions", "ribbon", "panel", "projection", "tween"),
+    "layout": ("view_layout", "view_reel", "view_panels", "view_terrain"),
+    "views": (
+        "summary",
+        "view_plots",
+        "view_rerun",
+        "view_landscape",
+        "view_movie",
+        "view_html",
+    ),
     "roof": ("output", "landscape_words", "cli", "__main__"),
 }
 # What each room may import from besides itself.
@@ -75,7 +82,7 @@ BELOW = {
     "kernels": (),
     "engine": ("statement", "answer", "kernels"),
     "film": ("statement", "answer"),
-    "layout": ("film",),
+    "layout": ("statement", "answer", "film"),
     "views": ("statement", "answer", "film", "layout"),
     "roof": ("statement", "answer", "engine", "views"),
 }
@@ -263,6 +270,7 @@ def test_only_commands_import_validation_and_scenarios():
             "matplotlib",
             {
                 "der/view_landscape.py",
+                "der/view_movie.py",
                 "der/view_plots.py",
                 "scenarios/hysteresis_plot.py",
                 "validation/comparison_plot.py",
@@ -271,7 +279,17 @@ def test_only_commands_import_validation_and_scenarios():
                 "validation/phase_plot.py",
             },
         ),
-        ("rerun", {"der/view_layout.py", "der/view_rerun.py"}),
+        (
+            "rerun",
+            {
+                "der/view_layout.py",
+                "der/view_panels.py",
+                "der/view_reel.py",
+                "der/view_rerun.py",
+                "der/view_terrain.py",
+            },
+        ),
+        ("plotly", {"der/view_html.py"}),
         ("dask", set()),
         ("distributed", {"validation/workers.py"}),
     ],
@@ -336,7 +354,7 @@ def test_a_fold_without_a_plot_loads_no_matplotlib():
         "try:\n    main('fold circle --h-over-t 4 --edges 16 --gamma-max 0.1'.split())\n"
         "except SystemExit as left:\n    assert left.code == 0"
     )
-    assert loaded(ask, "matplotlib", "PIL", "rich", "rerun") == []
+    assert loaded(ask, "matplotlib", "PIL", "rich", "rerun", "plotly") == []
 
 
 # --- Names -----------------------------------------------------------------------------------
