@@ -11,13 +11,23 @@ import math
 import sys
 import time
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from der.output import OUTPUT, UNSAVED, check_writable, say, show, targets, whereabouts, write
+from der.output import (
+    OUTPUT,
+    UNSAVED,
+    check_writable,
+    kept,
+    say,
+    show,
+    targets,
+    whereabouts,
+    write,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -272,6 +282,16 @@ class FileOptions:
     rrd: Annotated[
         str | None, typer.Option(metavar="F", help="Record for playback with rerun: .rrd.")
     ] = None
+    movie: Annotated[
+        str | None, typer.Option(metavar="F", help="Film it: .gif, or .mp4 (needs ffmpeg).")
+    ] = None
+    html: Annotated[
+        str | None, typer.Option(metavar="F", help="A page to scrub in any browser: .html.")
+    ] = None
+    beside: Annotated[
+        str | None,
+        typer.Option(metavar="DIR", help="Show the ring of this --out DIR, too, where it moves."),
+    ] = None
     out: Annotated[
         str | None,
         typer.Option(metavar="DIR", help="Write path.json, path.png and shapes.npz here."),
@@ -279,13 +299,28 @@ class FileOptions:
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False
 
     @property
+    def moving(self) -> bool:
+        """Whether something is written that shows how the ring moves."""
+        return any(file is not None for file in (self.rrd, self.movie, self.html))
+
+    @property
     def drawn(self) -> bool:
         """Whether shapes are needed."""
-        return any(file is not None for file in (self.plot, self.rrd, self.out))
+        return self.moving or any(file is not None for file in (self.plot, self.out))
 
     def targets(self) -> dict[str, File]:
         """The files to write, after making sure that they can be written."""
-        return targets(self.json, self.plot, self.rrd, self.out)
+        return targets(self.json, self.plot, self.rrd, self.out, movie=self.movie, html=self.html)
+
+    def other(self) -> Path | None:
+        """The path that is to be shown beside this one."""
+        if self.beside is None:
+            return None
+        if not self.moving:
+            raise ValueError(
+                f"beside must go with --rrd, --movie or --html, got {self.beside!r} alone"
+            )
+        return kept(self.beside)
 
 
 @dataclass(frozen=True)
@@ -373,10 +408,11 @@ def fold(ring: RingOptions, path: PathOptions, files: FileOptions, watch: LiveOp
     """Fold a ring: the path of equilibria from flat on, its folds, and the index of every state."""
     with _options_named():
         playback = watch.live or files.rrd is not None
+        other = files.other()
         scene = path.scene(
             ring,
             shapes=playback or files.drawn,
-            history=playback,
+            history=playback or files.moving,
             modes=playback and path.stability and path.solver == "newton",
         )
         written = files.targets()
@@ -388,7 +424,7 @@ def fold(ring: RingOptions, path: PathOptions, files: FileOptions, watch: LiveOp
         def run(progress: Callable[[float], object] | None) -> Path:
             return solve(scene, progress=progress, watch=None if shown is None else shown.show)
 
-        found, code = _follow(run, scene, written, quiet=files.quiet)
+        found, code = _follow(run, scene, written, other, quiet=files.quiet)
         if shown is not None and len(found) and found.status != "interrupted":
             _keep_showing(shown, found)
     return code
@@ -404,11 +440,12 @@ def bvp(ring: RingOptions, path: PathOptions, files: FileOptions) -> int:
         scene = path.scene(ring, shapes=files.drawn, error_bars=False, tolerance=1e-10)
         check(scene, tolerance)
         written = files.targets()
+        other = files.other()
 
     def run(progress: Callable[[float], object] | None) -> Path:
         return solve(scene, tolerance=tolerance, progress=progress)
 
-    return _follow(run, scene, written, quiet=files.quiet)[1]
+    return _follow(run, scene, written, other, quiet=files.quiet)[1]
 
 
 @dataclass(frozen=True)
@@ -523,6 +560,10 @@ class LandscapeOptions:
         None
     )
     plot: Annotated[str | None, typer.Option(metavar="F", help="Draw it: .png, .pdf, .svg.")] = None
+    rrd: Annotated[
+        str | None,
+        typer.Option(metavar="F", help="Record it with the ring for playback with rerun: .rrd."),
+    ] = None
     out: Annotated[
         str | None, typer.Option(metavar="DIR", help="Write landscape.json and .png here.")
     ] = None
@@ -537,8 +578,12 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
             raise ValueError("free cannot be given together with --two-dimensional, got both")
         if not 3 <= wanted.cells <= 1000:
             raise ValueError(f"cells must be from 3 to 1000, got {wanted.cells}")
+        if wanted.free and wanted.rrd is not None:
+            raise ValueError(f"rrd cannot be given together with --free, got {wanted.rrd!r}")
         scene = path.scene(ring, error_bars=not wanted.two_dimensional)
-        written = targets(wanted.json, wanted.plot, None, wanted.out, stem="landscape")
+        if wanted.rrd is not None and not wanted.two_dimensional:
+            scene = _with_shapes(scene)
+        written = targets(wanted.json, wanted.plot, wanted.rrd, wanted.out, stem="landscape")
         written.pop("shapes", None)
         found: Any
         with _progress(scene, quiet=wanted.quiet) as tick:
@@ -554,8 +599,32 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
                 from der.landscape_curve import landscape as along
 
                 found = along(scene, progress=tick)
+        recorded = found
+        if wanted.rrd is not None and wanted.two_dimensional and found.status != "interrupted":
+            from der.landscape_curve import landscape as along
+
+            recorded = along(_with_shapes(scene), index_free=False)
     code = {"done": 0, "interrupted": 130}.get(found.status, 3)
+    if "rrd" in written and not _record_landscape(recorded, found, written.pop("rrd")):
+        code = code or 3
     return _write_landscape(found, written, code, quiet=wanted.quiet)
+
+
+def _with_shapes(scene: Scene) -> Scene:
+    """The scene with the ring at every state, and its softest modes."""
+    return replace(scene, shapes=True, modes=True)
+
+
+def _record_landscape(landscape: Any, found: Any, file: File) -> bool:
+    """Write the recording of a landscape, that of a surface on it; say where that fails."""
+    from der.view_rerun import save_landscape
+
+    try:
+        save_landscape(landscape, file, surface=None if found is landscape else found)
+    except (OSError, ValueError) as wrong:
+        say(f"der: could not write {file}: {wrong}")
+        return False
+    return True
 
 
 def _write_landscape(found: Any, written: dict[str, File], code: int, *, quiet: bool) -> int:
@@ -763,10 +832,14 @@ def _follow(
     run: Callable[[Callable[[float], object] | None], Path],
     scene: Scene,
     written: dict[str, File],
+    other: Path | None,
     *,
     quiet: bool,
 ) -> tuple[Path, int]:
-    """Follow the path, write what was asked for, and return it with the exit code."""
+    """Follow the path, write what was asked for, and return it with the exit code.
+
+    Where ``other`` is given, what moves shows it, too.
+    """
     from der.unfinished import Interrupted, NotConverged
 
     code = 0
@@ -776,15 +849,17 @@ def _follow(
     except (NotConverged, Interrupted) as unfinished:
         path = unfinished.path
         code = 3 if isinstance(unfinished, NotConverged) else 130
-    return path, _finish(path, written, code, quiet=quiet)
+    return path, _finish(path, written, code, other, quiet=quiet)
 
 
-def _finish(path: Path, written: dict[str, File], code: int, *, quiet: bool) -> int:
+def _finish(
+    path: Path, written: dict[str, File], code: int, other: Path | None = None, *, quiet: bool
+) -> int:
     """Write a path, finished or not, say what there is to say, and return the exit code."""
     if path.status != "done":
         file = written.setdefault("json", UNSAVED)
         written.setdefault("shapes", (UNSAVED if file == OUTPUT else file).with_suffix(".npz"))
-    if not write(path, written):
+    if not write(path, written, other):
         code = code or 3
     if path.status != "done":
         say(f"der: {path.message}; {whereabouts(path, written)}")

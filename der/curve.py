@@ -37,8 +37,8 @@ def smooth(path: Path, height: Array, per: int = 16) -> Array:
     values = np.column_stack([path.gamma / math.pi, height])
     place = np.arange(per * (len(path) - 1) + 1) / per
     curve = np.column_stack([np.interp(place, np.arange(len(path)), v) for v in values.T])
-    chord = _chord(path)
-    for first, last in _pieces(path):
+    chord = chord_length(path)
+    for first, last in pieces(path):
         piece = slice(first, last + 1)
         inside = slice(first * per, last * per + 1)
         curve[inside] = _spline(chord[piece], values[piece], place[inside] - first)
@@ -76,7 +76,7 @@ def _snaps(path: Path) -> list[int]:
     return [point.position for point in path.points if point.kind == "snap" and point.position]
 
 
-def _pieces(path: Path) -> list[tuple[int, int]]:
+def pieces(path: Path) -> list[tuple[int, int]]:
     """First and last states of the smooth pieces: cut at snaps, and where gamma is turned back."""
     landed = _snaps(path)
     way = np.diff(np.column_stack([path.gamma, path.moment]), axis=0)
@@ -102,7 +102,7 @@ def _spline(chord: Array, values: Array, place: Array) -> Array:
     return curve
 
 
-def _chord(path: Path) -> Array:
+def chord_length(path: Path) -> Array:
     """Return the chord length along (gamma, M), each over its range, up to every state."""
     step = [np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (path.gamma, path.moment)]
     return np.append(0.0, np.cumsum(np.hypot(*step)))

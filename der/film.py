@@ -137,6 +137,26 @@ def middles(x: Array) -> Array:
     return 0.5 * (x + np.roll(x, 1, axis=-2))
 
 
+def grips(film: Playback, radius: float, points: int) -> Array:
+    """How far each grip has turned: arcs, and its own middle last, (2, n, points + 1, 3).
+
+    Parameters
+    ----------
+    radius : of the arcs, over the ring's mean radius.
+    points : on each arc, from where the grip began to where it is.
+    """
+    n_v = film.x.shape[1]
+    middle = middles(film.x)
+    found = []
+    for edge, sign in ((0, 1.0), (n_v // 2, -1.0)):
+        centre, d1 = middle[:, edge], film.frames[0, edge, 0]
+        across = np.cross([0.0, 0.0, 1.0], d1)
+        turned = np.linspace(0.0, sign * film.gamma, points, axis=1)[..., None]
+        arc = radius * film.size * (np.cos(turned) * d1 + np.sin(turned) * across)
+        found.append(np.concatenate([centre[:, None] + arc, centre[:, None]], axis=1))
+    return np.array(found)
+
+
 def _strains(frames: Array) -> Array:
     """Rotation vectors (..., N, 3) [rad] from each frame to the next, seen in the frames."""
     turn = frames @ np.roll(frames, -1, axis=-3).swapaxes(-1, -2)

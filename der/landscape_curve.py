@@ -24,9 +24,12 @@ from der.record import Path, Point, Timing, counts
 from der.rod import edges
 from der.scene import Scene, meshes
 from der.sector import Sector, sector
+from der.shapes import Shapes
+from der.sites import sites
 from der.special import Visit, Wanted, full_index, three_covered, visit
 from der.step import Stuck, Tally
 from der.unfinished import interrupts_between_states
+from der.unfolding import shapes
 
 FARTHEST = 2.0 * math.pi  # rad; a path that gets there unfolded, or to its negative, does not fold
 _MOST_STEPS = 600  # rings that fold do so in less than 150
@@ -41,8 +44,8 @@ def landscape(
 
     Parameters
     ----------
-    scene : ring, section, mesh, ``save_at`` and ``stability``; where the path ends is not asked
-        of it but of the ring.
+    scene : ring, section, mesh, ``save_at``, ``stability``, ``shapes`` and ``modes``; where the
+        path ends is not asked of it but of the ring.
     progress : called with gamma [rad] after every state.
     index_free : whether to compute the index of every rest with the grips removed.
 
@@ -80,8 +83,9 @@ def landscape(
     found = Landscape(path, rests, folded, barriers(rests, folded=folded, message=message))
     if not scene.error_bars or not folded:
         return found
+    bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
     coarse = [
-        landscape(replace(scene, n_edges=n, error_bars=False, stability=False), index_free=False)
+        landscape(replace(bare, n_edges=n), index_free=False)
         for n in meshes(scene.n_edges, piece.name)[1:]
     ]
     return _without_mesh(found, extrapolated([_heights(one) for one in (found, *coarse)]))
@@ -228,9 +232,16 @@ def _path(
         mode=None,
         error=None,
         timing=timing,
+        shapes=_shapes(scene, piece, visits) if scene.shapes and visits else None,
         status=status,
         message=message,
     )
+
+
+def _shapes(scene: Scene, piece: Sector, visits: Sequence[Visit]) -> Shapes:
+    """The full ring at every state."""
+    arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
+    return shapes(piece, visits, arc_length, history=False, modes=scene.modes)
 
 
 def numerics(scene: Scene, piece: Sector) -> dict[str, object]:

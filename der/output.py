@@ -34,7 +34,14 @@ def show(text: str) -> bool:
 
 
 def targets(
-    json: str | None, plot: str | None, rrd: str | None, out: str | None, *, stem: str = "path"
+    json: str | None,
+    plot: str | None,
+    rrd: str | None,
+    out: str | None,
+    *,
+    movie: str | None = None,
+    html: str | None = None,
+    stem: str = "path",
 ) -> dict[str, File]:
     """The files to write, after making sure that they can be written."""
     files: dict[str, File] = {}
@@ -61,7 +68,17 @@ def targets(
         if File(rrd).suffix != ".rrd":
             raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
         files["rrd"] = File(rrd)
-    if files.get("json") in [files[name] for name in ("plot", "shapes") if name in files]:
+    if movie is not None:
+        from der.view_movie import check_movie
+
+        check_movie(movie)
+        files["movie"] = File(movie)
+    if html is not None:
+        from der.view_html import check_html
+
+        check_html(html)
+        files["html"] = File(html)
+    if files.get("json") in [files[name] for name in files if name != "json"]:
         raise ValueError(f"json must be a file of its own, got {json!r} twice")
     for name, file in files.items():
         if file != OUTPUT:
@@ -97,14 +114,47 @@ def whereabouts(path: Path, targets: dict[str, File]) -> str:
     )
 
 
-def write(path: Path, targets: dict[str, File]) -> bool:
+def kept(folder: str) -> Path:
+    """The path that an earlier command has kept in its --out folder, with its shapes.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or none with shapes.
+    """
+    from dataclasses import replace
+
+    from der.record import Path
+    from der.shapes import Shapes
+
+    try:
+        path = Path.load(File(folder) / "path.json")
+        path = replace(path, shapes=Shapes.load(File(folder) / "shapes.npz"))
+    except OSError as wrong:
+        raise ValueError(
+            f"beside must be a folder with path.json and shapes.npz, as --out writes, "
+            f"got {folder!r}: {wrong.strerror}"
+        ) from None
+    except ValueError as wrong:
+        raise ValueError(
+            f"beside must be a folder as --out writes, got {folder!r}: {wrong}"
+        ) from None
+    if len(path) < 2:
+        raise ValueError(f"beside must hold a path of two states at least, got {folder!r}")
+    return path
+
+
+def write(path: Path, targets: dict[str, File], other: Path | None = None) -> bool:
     """Write the record first, then what goes with it; say what could not be written.
+
+    Where there is an ``other`` path, what moves shows it, too.
 
     A record that cannot be written where it should goes to standard output, also in ``targets``:
     nothing already computed is lost.
     """
     done = True
-    for name in ("json", "shapes", "plot", "rrd"):
+    shown = path if other is None else [path, other]
+    for name in ("json", "shapes", "plot", "rrd", "html", "movie"):
         file = targets.get(name)
         if file is None:
             continue
@@ -120,7 +170,15 @@ def write(path: Path, targets: dict[str, File]) -> bool:
             elif name == "rrd" and len(path) > 1:
                 from der.view_rerun import save_recording
 
-                save_recording(path, file)
+                save_recording(shown, file)
+            elif name == "html" and len(path) > 1:
+                from der.view_html import save_html
+
+                save_html(shown, file)
+            elif name == "movie" and len(path) > 1:
+                from der.view_movie import save_movie
+
+                save_movie(shown, file)
         except (OSError, ValueError) as wrong:
             done = False
             say(f"der: could not write {file}: {wrong}")

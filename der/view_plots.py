@@ -1,7 +1,6 @@
 """A path as one picture: snapshots of the ring above M(gamma) and U(gamma).
 
-The only file that imports matplotlib; figures are objects of their own, so that nothing global
-changes and no display is needed.
+Figures are objects of their own, so that nothing global changes and no display is needed.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from der.curve import SNAP, sides, smooth, stretches
 from der.files import FilePath, write_whole
-from der.flat_ribbon import projected
+from der.projection import HALF_WIDTH, seen
 from der.record import Mode, Path
 from der.shapes import Shapes
 
@@ -51,8 +50,6 @@ MARKS = {  # label, marker, size
 UNITS = {"vertex_angle": "°"}  # of a ring's parameters
 LETTERS = "ABCDEF"  # one for each snapshot
 CAPTION = 0.82  # room for what stands below a ribbon, of the row's height
-HALF_WIDTH = 0.085  # of a ribbon, over the flat ring's mean radius: exaggerated, to be seen
-CAMERA = np.array([0.80, 0.45, 0.40])  # the ring lies in the plane of the last two axes
 
 
 def figure_of_path(path: Path) -> Figure:
@@ -278,8 +275,7 @@ def _draw_ribbons(row: Axes, shapes: Shapes, gamma: Array, chosen: list[int]) ->
     x, frames = shapes.x, shapes.frames
     length = float(np.linalg.norm(np.diff(x[0], axis=0, append=x[0][:1]), axis=1).sum())
     width = HALF_WIDTH * length / (2 * math.pi)
-    camera = _camera()
-    ribbons = [projected(x[k], frames[k, :, 0], width, camera, grips=True) for k in chosen]
+    ribbons = [seen(x[k], frames[k, :, 0], width) for k in chosen]
     spans = np.array([np.ptp(corners.reshape(-1, 2), axis=0) for corners, _ in ribbons])
     tall = 1.06 * spans[:, 1].max()
     slot = max(1.12 * spans[:, 0].max(), CAPTION * tall)
@@ -296,11 +292,3 @@ def _draw_ribbons(row: Axes, shapes: Shapes, gamma: Array, chosen: list[int]) ->
     row.set_ylim(-0.62 * tall, 0.5 * tall)
     row.set_aspect("equal")
     row.set_axis_off()
-
-
-def _camera() -> tuple[Array, Array, Array]:
-    """Return the directions to the camera, to its right and up; the twisting axis is upright."""
-    towards = CAMERA / np.linalg.norm(CAMERA)
-    right = np.cross([0.0, 0.0, 1.0], towards)
-    right /= np.linalg.norm(right)
-    return towards, right, np.cross(towards, right)

@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from der.checks import Array
 from der.files import FilePath, write_whole
-from der.flat_ribbon import projected
+from der.projection import Camera, seen
 from der.states_record import RingState, States
 
 FORMATS = (".png", ".pdf", ".svg")
@@ -131,14 +131,14 @@ def _pictures(
     for i, state in enumerate(shown):
         spread = _drawn_apart(x[i], state)
         radius = float(np.linalg.norm(np.diff(x[i], axis=0), axis=1).sum()) / (2.0 * math.pi)
-        towards, right, up = _camera(spread)
-        light = LIGHT @ np.stack([right, up, towards])
+        camera = _camera(spread)
+        light = LIGHT @ np.stack([camera.right, camera.up, camera.towards])
         ribbons.append(
-            projected(
+            seen(
                 spread,
                 frames[i, :, 0],
                 HALF_WIDTH * radius,
-                (towards, right, up),
+                camera,
                 grips=found.gamma is not None,
                 light=light,
             )
@@ -170,7 +170,7 @@ def _drawn_apart(x: Array, state: RingState) -> Array:
     return middle + (x - middle) * (1.0 + APART * np.cos(turn))
 
 
-def _camera(x: Array) -> tuple[Array, Array, Array]:
+def _camera(x: Array) -> Camera:
     """Directions to the reader, right and up: off the normal of the plane closest to a shape.
 
     The longest axis lies level; of two sides, the picture is seen from that of +E1, or else +E3.
@@ -183,7 +183,7 @@ def _camera(x: Array) -> tuple[Array, Array, Array]:
     normal = normal * (1.0 if normal @ (1.0, 0.3, 0.1) >= 0.0 else -1.0)
     up = np.cross(normal, right)
     towards = math.cos(TILT) * normal - math.sin(TILT) * up
-    return towards, right, np.cross(towards, right)
+    return Camera(towards, right, np.cross(towards, right))
 
 
 # --- The graph -------------------------------------------------------------------------------

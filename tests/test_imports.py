@@ -69,9 +69,17 @@ ROOMS = {
         "states_measures",
         "states_search",
     ),
-    "film": ("curve", "film", "captions", "ribbon", "flat_ribbon", "panel"),
-    "layout": ("view_layout",),
-    "views": ("summary", "view_plots", "view_rerun", "view_landscape", "view_states"),
+    "film": ("curve", "film", "captions", "ribbon", "panel", "projection", "tween"),
+    "layout": ("view_layout", "view_reel", "view_panels", "view_terrain"),
+    "views": (
+        "summary",
+        "view_plots",
+        "view_rerun",
+        "view_landscape",
+        "view_movie",
+        "view_html",
+        "view_states",
+    ),
     "roof": ("output", "landscape_words", "states_words", "cli", "__main__"),
 }
 # What each room may import from besides itself.
@@ -81,7 +89,7 @@ BELOW = {
     "kernels": (),
     "engine": ("statement", "answer", "kernels"),
     "film": ("statement", "answer"),
-    "layout": ("film",),
+    "layout": ("statement", "answer", "film"),
     "views": ("statement", "answer", "film", "layout"),
     "roof": ("statement", "answer", "engine", "views"),
 }
@@ -269,6 +277,7 @@ def test_only_commands_import_validation_and_scenarios():
             "matplotlib",
             {
                 "der/view_landscape.py",
+                "der/view_movie.py",
                 "der/view_plots.py",
                 "der/view_states.py",
                 "scenarios/hysteresis_plot.py",
@@ -279,7 +288,17 @@ def test_only_commands_import_validation_and_scenarios():
                 "validation/phase_plot.py",
             },
         ),
-        ("rerun", {"der/view_layout.py", "der/view_rerun.py"}),
+        (
+            "rerun",
+            {
+                "der/view_layout.py",
+                "der/view_panels.py",
+                "der/view_reel.py",
+                "der/view_rerun.py",
+                "der/view_terrain.py",
+            },
+        ),
+        ("plotly", {"der/view_html.py"}),
         ("dask", set()),
         ("distributed", {"validation/workers.py"}),
     ],
@@ -344,7 +363,7 @@ def test_a_fold_without_a_plot_loads_no_matplotlib():
         "try:\n    main('fold circle --h-over-t 4 --edges 16 --gamma-max 0.1'.split())\n"
         "except SystemExit as left:\n    assert left.code == 0"
     )
-    assert loaded(ask, "matplotlib", "PIL", "rich", "rerun") == []
+    assert loaded(ask, "matplotlib", "PIL", "rich", "rerun", "plotly") == []
 
 
 # --- Names -----------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from rerun.chunk import RrdReader
 import der
 from der.cli import main
 from der.shapes import Shapes
+from der.view_movie import save_movie
 
 SMALL = ("fold", "circle", "--h-over-t", "4", "--edges", "16", "--quiet")
 
@@ -91,6 +92,114 @@ def test_modes_are_not_computed_where_stability_is_not(tmp_path, more):
     assert ended.value.code == 0
     entities = {chunk.entity_path for chunk in RrdReader(str(tmp_path / "p.rrd")).stream()}
     assert "/ring/softest_mode" not in entities
+
+
+@pytest.mark.parametrize(
+    ("option", "name"), [("--movie", "p.mov"), ("--html", "p.htm"), ("--movie", "missing/p.gif")]
+)
+def test_a_film_or_page_in_a_bad_place_is_named_before_anything_is_solved(
+    tmp_path, capsys, option, name
+):
+    with pytest.raises(SystemExit) as ended:
+        main([*SMALL, option, str(tmp_path / name)])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"der: {option} must ")
+    assert name in line
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("solver", "option", "name", "start"),
+    [("fold", "--movie", "p.gif", b"GIF89a"), ("bvp", "--html", "p.html", b"<!DOCT")],
+)
+def test_film_and_page_are_written(tmp_path, monkeypatch, solver, option, name, start):
+    """Of either solver; the film in few pictures here."""
+    monkeypatch.setattr(save_movie, "__kwdefaults__", {"fps": 2, "frames": 2})
+    with pytest.raises(SystemExit) as ended:
+        main([solver, *SMALL[1:], "--gamma-max", "0.5", option, str(tmp_path / name)])
+    assert ended.value.code == 0
+    assert (tmp_path / name).read_bytes().startswith(start)
+
+
+def test_beside_shows_the_ring_of_an_earlier_command(tmp_path):
+    """Of either solver; both are in the recording."""
+    for words in (("bvp", *SMALL[1:]), (*SMALL, "--sector", "half")):
+        with pytest.raises(SystemExit) as ended:
+            main([*words, "--gamma-max", "1", "--out", str(tmp_path / "kept")])
+        assert ended.value.code == 0
+        file = tmp_path / f"{words[0]}.rrd"
+        with pytest.raises(SystemExit) as ended:
+            main(
+                [*SMALL, "--gamma-max", "1", "--beside", str(tmp_path / "kept"), "--rrd", str(file)]
+            )
+        assert ended.value.code == 0
+        entities = {chunk.entity_path for chunk in RrdReader(str(file)).stream()}
+        assert {"/first/ring/ribbon", "/second/ring/ribbon"} <= entities
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ((), "--beside must go with --rrd, --movie or --html"),
+        (("--rrd", "p.rrd"), "--beside must be a folder with path.json and shapes.npz"),
+    ],
+)
+def test_beside_names_what_is_missing(tmp_path, capsys, monkeypatch, more, said):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main([*SMALL, "--beside", "nowhere", *more])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"der: {said}")
+    assert "'nowhere'" in line
+    assert not list(tmp_path.iterdir())
+
+
+def test_beside_names_a_broken_record(tmp_path, capsys):
+    (tmp_path / "path.json").write_text("{")
+    with pytest.raises(SystemExit) as ended:
+        main([*SMALL, "--beside", str(tmp_path), "--rrd", str(tmp_path / "p.rrd")])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("der: --beside must be a folder as --out writes")
+    assert "path.json: not JSON" in line
+
+
+@pytest.mark.parametrize(("name", "option"), [("movie", "save_movie"), ("html", "save_html")])
+def test_a_full_disk_costs_the_film_and_nothing_else(tmp_path, capsys, monkeypatch, name, option):
+    """Code 3, one line that names the file; the record is there."""
+
+    def full(*_):
+        raise ValueError(f"{name} 'f' cannot be written: No space left on device")
+
+    monkeypatch.setattr(f"der.view_{name}.{option}", full)
+    file = tmp_path / {"movie": "p.gif", "html": "p.html"}[name]
+    with pytest.raises(SystemExit) as ended:
+        main([*SMALL, f"--{name}", str(file), "--json", str(tmp_path / "p.json")])
+    assert ended.value.code == 3
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"der: could not write {file}: ")
+    assert der.Path.load(tmp_path / "p.json").status == "done"
+
+
+@pytest.mark.parametrize("more", [(), ("--two-dimensional", "--cells", "5")])
+def test_a_landscape_is_recorded_with_the_ring(tmp_path, more):
+    file = tmp_path / "l.rrd"
+    words = ["landscape", *SMALL[1:], "--edges", "32", *more, "--rrd", str(file)]
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 0
+    entities = {chunk.entity_path for chunk in RrdReader(str(file)).stream()}
+    assert {"/ring/ribbon", "/landscape/whole/now"} <= entities
+    assert ("/surface/now" in entities) is bool(more)
+
+
+def test_a_landscape_without_grips_is_not_recorded(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["landscape", *SMALL[1:], "--free", "--rrd", str(tmp_path / "l.rrd")])
+    assert ended.value.code == 2
+    assert "--rrd cannot be given together with --free" in capsys.readouterr().err
 
 
 # --- Live ------------------------------------------------------------------------------------

@@ -14,9 +14,11 @@ from rerun.chunk import RrdReader
 import der
 from der import files, view_rerun
 from der.film import playback
+from der.landscape_curve import landscape
+from der.landscape_surface import surface
 from der.record import Timing, counts
 from der.shapes import Fall, Shapes, Softest
-from der.view_rerun import recording_bytes, save_recording
+from der.view_rerun import recording_bytes, save_landscape, save_recording
 
 EDGES = 32
 
@@ -475,3 +477,108 @@ def test_400_steps_of_128_edges_stay_below_10_megabytes():
     long = der.fold(scene)
     assert len(long) >= 400
     assert len(recording_bytes(long)) / len(long) * 400 < 10e6
+
+
+# --- Two rings, and landscapes ---------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def slim():
+    """A circle of h/t = 4, whose gamma never turns back."""
+    scene = der.Scene(der.circle(), der.rectangular_section(4), n_edges=EDGES, shapes=True)
+    return der.fold(scene)
+
+
+def test_two_rings_are_on_one_timeline(path, slim, tmp_path):
+    """Each with its own entities, a row a step, at equal gamma until the first of them folds."""
+    read = written(tmp_path, [path, slim])
+    rows = [
+        read.rows(f"/{under}/ring/centreline", "LineStrips3D:strips")
+        for under in ("first", "second")
+    ]
+    assert list(rows[0]) == list(rows[1]) == list(range(len(rows[0])))
+    gamma = [
+        np.array([v for (v,) in read.rows(f"/{under}/series/gamma", "Scalars:scalars").values()])
+        for under in ("first", "second")
+    ]
+    until = int(np.argmax(gamma[0] > path.folds[1].gamma - 0.1))
+    assert until > 50
+    assert_allclose(gamma[0][:until], gamma[1][:until], atol=2 * np.pi / 240)
+    for whole, strips in zip((path, slim), rows, strict=True):
+        last = np.array(strips[len(strips) - 1][0])[:-1]
+        assert_allclose(last, whole.shapes.x[-1], atol=2e-7)
+
+
+def test_two_rings_share_panels_and_the_log_names_them(path, slim, tmp_path):
+    """One pair of axes; the point where both are flat is in the same place."""
+    read = written(tmp_path, [path, slim])
+    for name in ("moment", "energy"):
+        assert f"/curves/{name}/axes" in read.entities
+        dots = [
+            read.rows(f"/{under}/curves/{name}/now", "Points2D:positions")[0][0]
+            for under in ("first", "second")
+        ]
+        assert_allclose(*dots, atol=1e-6)
+    for under, called, whole in (("first", "1.6", path), ("second", "4", slim)):
+        lines = read.rows(f"/{under}/events", "TextLog:text")
+        assert len(lines) == len(whole.points)
+        assert all(line.startswith(f"circle, h/t = {called}: ") for (line,) in lines.values())
+
+
+def test_three_rings_are_too_many(path):
+    with pytest.raises(ValueError, match="path must be one or two, got 3"):
+        recording_bytes([path] * 3)
+
+
+def landscape_scene(h_over_t):
+    return der.Scene(
+        der.circle(), der.rectangular_section(h_over_t), n_edges=16, shapes=True, error_bars=False
+    )
+
+
+def test_landscape_has_its_rests_barriers_and_the_present_state(tmp_path):
+    """Wells flat and folded, the saddle in between, and a dot on U at every step."""
+    found = landscape(landscape_scene(4))
+    save_landscape(found, tmp_path / "l.rrd")
+    read = Recording(tmp_path / "l.rrd")
+    whole = read.rows("/landscape/whole/well", "Points2D:positions")[None]
+    saddle = read.rows("/landscape/whole/saddle", "Points2D:positions")[None]
+    dots = read.rows("/landscape/whole/now", "Points2D:positions")
+    assert list(dots) == list(range(len(found.path)))
+    at = [rest.position for rest in found.rests]
+    for place, k in zip((whole[0], saddle[0], whole[1]), at, strict=True):
+        assert_allclose(place, dots[k][0], atol=1e-4)
+    said = read.rows("/landscape/whole/fold/text", "Points2D:labels")[None]
+    assert said == [f"to fold {found.barriers.fold:.4g}"]
+    said = read.rows("/landscape/well/open/text", "Points2D:labels")[None]
+    assert said == [f"to open {found.barriers.open:.4g}"]
+    inside = [k for k, row in read.rows("/landscape/well/now", "Points2D:positions").items() if row]
+    assert inside == [k for k in range(len(found.path)) if k >= min(inside)]
+    assert inside[0] <= at[1] <= at[2] == inside[-1]
+
+
+def test_present_state_moves_on_the_surface(tmp_path):
+    """Its places are those of the path of twisting: the same states on another mesh of gamma."""
+    scene = landscape_scene(1.6)
+    ground = surface(scene, shape=(7, 6))
+    save_landscape(landscape(scene), tmp_path / "s.rrd", surface=ground)
+    read = Recording(tmp_path / "s.rrd")
+    dots = np.array([row[0] for row in read.rows("/surface/now", "Points3D:positions").values()])
+    line = np.array(read.rows("/surface/path", "LineStrips3D:strips")[None][0])
+    ends = [np.linalg.norm(line - dot, axis=1).min() for dot in dots[[0, -1]]]
+    assert_allclose(ends, 0, atol=1e-5)
+    for dot in dots:
+        a, way = line[:-1], np.diff(line, axis=0)
+        share = np.clip(np.sum((dot - a) * way, axis=1) / np.sum(way**2, axis=1), 0, 1)
+        assert np.linalg.norm(a + share[:, None] * way - dot, axis=1).min() < 0.02
+    corners = np.array(read.rows("/surface/energy", "Mesh3D:vertex_positions")[None])
+    triangles = np.array(read.rows("/surface/energy", "Mesh3D:triangle_indices")[None])
+    assert len(corners) == ground.energy.size
+    known = np.isfinite(ground.energy.ravel()) & (corners[:, 2] <= 0.55 + 1e-6)
+    assert known[triangles].all()
+
+
+def test_landscape_without_shapes_is_refused(tmp_path):
+    found = landscape(replace(landscape_scene(4), shapes=False))
+    with pytest.raises(ValueError, match="path must have shapes"):
+        save_landscape(found, tmp_path / "l.rrd")
