@@ -515,6 +515,9 @@ class LandscapeOptions:
     free: Annotated[bool, typer.Option("--free", help="The barrier with the grips removed.")] = (
         False
     )
+    push: Annotated[
+        bool, typer.Option("--push", help="The forces or couples that open it with least work.")
+    ] = False
     cells: Annotated[
         int, typer.Option(parser=_whole, help="Along each side, with --two-dimensional.")
     ] = 60
@@ -534,6 +537,9 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
     with _options_named():
         if wanted.two_dimensional and wanted.free:
             raise ValueError("free cannot be given together with --two-dimensional, got both")
+        if wanted.push and (wanted.two_dimensional or wanted.free):
+            other = "--free" if wanted.free else "--two-dimensional"
+            raise ValueError(f"push cannot be given together with {other}, got both")
         if not 3 <= wanted.cells <= 1000:
             raise ValueError(f"cells must be from 3 to 1000, got {wanted.cells}")
         scene = path.scene(ring, error_bars=not wanted.two_dimensional)
@@ -545,6 +551,10 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
                 from der.landscape_surface import surface
 
                 found = surface(scene, shape=(wanted.cells, wanted.cells), progress=tick)
+            elif wanted.push:
+                from der.landscape_push import least_push
+
+                found = least_push(scene, progress=tick)
             elif wanted.free:
                 from der.landscape_free import free_barrier
 
@@ -579,15 +589,22 @@ def _write_landscape(found: Any, written: dict[str, File], code: int, *, quiet: 
 
 def _draw_landscape(found: Any, file: File) -> None:
     from der import view_landscape as view
-    from der.landscape_record import Landscape, Surface
+    from der.landscape_push_record import LeastPush
+    from der.landscape_record import Landscape
+    from der.landscape_surface_record import Surface
+    from der.view_style import save_figure
 
     if isinstance(found, Landscape):
         figure = view.figure_of_landscape(found)
     elif isinstance(found, Surface):
         figure = view.figure_of_surface(found)
+    elif isinstance(found, LeastPush):
+        from der.view_push import figure_of_push
+
+        figure = figure_of_push(found)
     else:
         figure = view.figure_of_pass(found)
-    view.save_figure(figure, file)
+    save_figure(figure, file)
 
 
 PHASES = {  # the diagrams of each shape, that of a cube last

@@ -28,7 +28,16 @@ ROOMS = {
         "sections",
         "scene",
     ),
-    "answer": ("files", "shapes", "record", "unfinished", "landscape_record"),
+    "answer": (
+        "files",
+        "shapes",
+        "record",
+        "unfinished",
+        "landscape_files",
+        "landscape_record",
+        "landscape_surface_record",
+        "landscape_push_record",
+    ),
     "kernels": ("frames", "strain", "dense", "block_ldl", "linking", "assembly"),
     "engine": (
         "rod",
@@ -62,10 +71,14 @@ ROOMS = {
         "landscape_saddles",
         "landscape_free",
         "landscape_over",
+        "landscape_tools",
+        "landscape_march",
+        "landscape_push_search",
+        "landscape_push",
     ),
     "film": ("curve", "film", "captions", "ribbon", "panel"),
-    "layout": ("view_layout",),
-    "views": ("summary", "view_plots", "view_rerun", "view_landscape"),
+    "layout": ("view_layout", "view_style"),
+    "views": ("summary", "view_plots", "view_rerun", "view_landscape", "view_push"),
     "roof": ("output", "landscape_words", "cli", "__main__"),
 }
 # What each room may import from besides itself.
@@ -75,9 +88,9 @@ BELOW = {
     "kernels": (),
     "engine": ("statement", "answer", "kernels"),
     "film": ("statement", "answer"),
-    "layout": ("film",),
+    "layout": ("answer", "statement", "film"),
     "views": ("statement", "answer", "film", "layout"),
-    "roof": ("statement", "answer", "engine", "views"),
+    "roof": ("statement", "answer", "engine", "layout", "views"),
 }
 ROOM = {module: room for room, modules in ROOMS.items() for module in modules}
 BENCHES = {"bench", "stress"}  # of validation: they time the engine, so they see all of it
@@ -264,6 +277,8 @@ def test_only_commands_import_validation_and_scenarios():
             {
                 "der/view_landscape.py",
                 "der/view_plots.py",
+                "der/view_push.py",
+                "der/view_style.py",
                 "scenarios/hysteresis_plot.py",
                 "validation/comparison_plot.py",
                 "validation/figures/canvas.py",
