@@ -5,7 +5,7 @@ The Lagrangian is
     L = sum_s W_s(conj(q_s) o q_{s+1}) + sum_j EA l_j eps_j^2/2
         + sum_k F_k (sum_j weight_kj e_j . axis_k - target_k) - load sum_j pull_j . e_j
 
-with e_j = l_j (1 + eps_j) d3_j. Along q o exp(w/2) the tangent moves as
+with e_j = (l_j (1 + eps_j) + load reach_j) d3_j. Along q o exp(w/2) the tangent moves as
 
     d3 + (w2 d1 - w1 d2) + [w1 w3 d1 + w2 w3 d2 - (w1^2 + w2^2) d3]/2 + O(w^3),
 
@@ -73,6 +73,16 @@ def position_rows(length, weight, axis, quat, stretch, out_sum, out_border):
 
 
 @njit(cache=True)
+def lengthened(rod, held, stretch, load):
+    """Strains (n,) that make edges as long as they are: their own, and what the load adds."""
+    strain = stretch.copy()
+    for j in range(strain.shape[0]):
+        if held.reach[j] != 0.0:
+            strain[j] += load * held.reach[j] / rod.length[j]
+    return strain
+
+
+@njit(cache=True)
 def assemble(rod, held, quat, stretch, force, load):
     """Derivatives of the Lagrangian; see `System`, `rod.Rod`, `supports.Supports`."""
     n, b = held.free.shape
@@ -83,7 +93,8 @@ def assemble(rod, held, quat, stretch, force, load):
     off = np.zeros((n, b, b))
     gap = np.zeros(n_c)
     border = np.zeros((n, b, n_c))
-    position_rows(rod.length, held.weight, held.axis, quat, stretch, gap, border)
+    strain = lengthened(rod, held, stretch, load)
+    position_rows(rod.length, held.weight, held.axis, quat, strain, gap, border)
     for k in range(n_c):
         gap[k] -= held.target[k]
     column = np.zeros((n, b))
@@ -154,7 +165,7 @@ def assemble(rod, held, quat, stretch, force, load):
     pull = np.empty(3)
     for j in range(n):
         eps = stretch[j]
-        now = rod.length[j] * (1.0 + eps)
+        now = rod.length[j] * (1.0 + strain[j])
         into_frame(quat[j], held.turn_axis, va)
         for i in range(3):
             va[i] *= held.turn[j]
@@ -192,6 +203,15 @@ def assemble(rod, held, quat, stretch, force, load):
                 (va[0] * f[0] + va[1] * f[1]) * va[2] - (va[0] ** 2 + va[1] ** 2) * f[2]
             )
             load_hess += 2.0 * now * (va[0] * pull[1] - va[1] * pull[0])
+        if held.reach[j] != 0.0:
+            reach = held.reach[j]
+            load_grad += reach * f[2]
+            load_hess -= 2.0 * reach * pull[2]
+            column[j, 0] -= reach * f[1]
+            column[j, 1] += reach * f[0]
+            for k in range(n_c):
+                into_frame(quat[j], held.axis[k], va)
+                load_border[k] += held.weight[k, j] * reach * va[2]
     return System(
         energy,
         grad,

@@ -553,6 +553,9 @@ class LandscapeOptions:
     free: Annotated[bool, typer.Option("--free", help="The barrier with the grips removed.")] = (
         False
     )
+    push: Annotated[
+        bool, typer.Option("--push", help="The forces or couples that open it with least work.")
+    ] = False
     cells: Annotated[
         int, typer.Option(parser=_whole, help="Along each side, with --two-dimensional.")
     ] = 60
@@ -576,6 +579,9 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
     with _options_named():
         if wanted.two_dimensional and wanted.free:
             raise ValueError("free cannot be given together with --two-dimensional, got both")
+        if wanted.push and (wanted.two_dimensional or wanted.free):
+            other = "--free" if wanted.free else "--two-dimensional"
+            raise ValueError(f"push cannot be given together with {other}, got both")
         if not 3 <= wanted.cells <= 1000:
             raise ValueError(f"cells must be from 3 to 1000, got {wanted.cells}")
         if wanted.free and wanted.rrd is not None:
@@ -591,6 +597,10 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
                 from der.landscape_surface import surface
 
                 found = surface(scene, shape=(wanted.cells, wanted.cells), progress=tick)
+            elif wanted.push:
+                from der.landscape_push import least_push
+
+                found = least_push(scene, progress=tick)
             elif wanted.free:
                 from der.landscape_free import free_barrier
 
@@ -649,15 +659,22 @@ def _write_landscape(found: Any, written: dict[str, File], code: int, *, quiet: 
 
 def _draw_landscape(found: Any, file: File) -> None:
     from der import view_landscape as view
-    from der.landscape_record import Landscape, Surface
+    from der.landscape_push_record import LeastPush
+    from der.landscape_record import Landscape
+    from der.landscape_surface_record import Surface
+    from der.view_style import save_figure
 
     if isinstance(found, Landscape):
         figure = view.figure_of_landscape(found)
     elif isinstance(found, Surface):
         figure = view.figure_of_surface(found)
+    elif isinstance(found, LeastPush):
+        from der.view_push import figure_of_push
+
+        figure = figure_of_push(found)
     else:
         figure = view.figure_of_pass(found)
-    view.save_figure(figure, file)
+    save_figure(figure, file)
 
 
 @dataclass(frozen=True)
@@ -706,7 +723,8 @@ def _write_states(found: States, written: dict[str, File], code: int, *, quiet: 
     for name, file in written.items():
         try:
             if name == "plot" and len(found):
-                from der.view_states import figure_of_states, save_figure
+                from der.view_states import figure_of_states
+                from der.view_style import save_figure
 
                 save_figure(figure_of_states(found), file)
             elif name == "shapes" and found.shapes is not None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from der.assembly import position_rows
+from der.assembly import lengthened, position_rows
 from der.frames import Array, into_frame, relative
 from der.strain import vertex_energy
 from der.supports import Supports
@@ -138,7 +138,7 @@ def conditions(rod, held, motion, out_pull):
         held.weight,
         held.axis,
         motion.quat,
-        motion.stretch,
+        lengthened(rod, held, motion.stretch, motion.load[0]),
         out_pull.gap,
         out_pull.border,
     )
@@ -149,6 +149,10 @@ def conditions(rod, held, motion, out_pull):
             for k in range(m):
                 for i in range(3):
                     out_pull.load_border[k] += held.turn[j] * v[i] * out_pull.border[j, i, k]
+        if held.reach[j] != 0.0:
+            for k in range(m):
+                into_frame(motion.quat[j], held.axis[k], v)
+                out_pull.load_border[k] += held.weight[k, j] * held.reach[j] * v[2]
 
 
 @njit(cache=True)
@@ -160,14 +164,14 @@ def _edge_forces(rod, held, motion, out_pull):
     f, v = np.empty(3), np.empty(3)
     for j in range(n):
         eps = motion.stretch[j]
-        now = rod.length[j] * (1.0 + eps)
+        now = rod.length[j] * (1.0 + eps) + load * held.reach[j]
         into_frame(motion.quat[j], held.pull[j], f)
         grad[j, 0] += load * now * f[1]
         grad[j, 1] -= load * now * f[0]
         if b == 4:
             grad[j, 3] += rod.length[j] * (rod.stretching * eps - load * f[2])
             energy += 0.5 * rod.stretching * rod.length[j] * eps * eps
-        out_pull.load_grad[0] -= now * f[2]
+        out_pull.load_grad[0] -= (now + load * held.reach[j]) * f[2]
         out_pull.work[0] += load * now * f[2]
         if held.turn[j] != 0.0:
             into_frame(motion.quat[j], held.turn_axis, v)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 
@@ -41,7 +41,7 @@ from der.unfinished import interrupts_between_states
 _KICK = 0.05  # rad, root mean square: off a saddle of higher index, along a mode that leads down
 _NUDGE = 0.02  # rad, likewise: off a saddle of index 1, on to one of its two sides
 _SOFTEST = 2  # modes of the folded ring that are followed uphill
-_ALIKE = 1e-6  # of the folded ring's energy: two saddles, or rests, that are one
+ALIKE = 1e-6  # of the folded ring's energy: two saddles, or rests, that are one
 _SHAPES = 60  # on the way, about equally far apart
 
 
@@ -80,7 +80,7 @@ def free_barrier(scene: Scene) -> Pass:
 def _pass(scene: Scene, pressed: list[int]) -> Pass:
     """The lowest way found on one mesh."""
     started = time.perf_counter()
-    rests, alone, twisting, why = twisted(scene)
+    rests, alone, twisting, why = twisted_rests(scene)
     found: list[_Found] = []
     if not why:
         end = rests[-1]
@@ -116,7 +116,7 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
     )
 
 
-def twisted(scene: Scene) -> tuple[list[Rest], list[Alone], Barriers, str]:
+def twisted_rests(scene: Scene) -> tuple[list[Rest], list[Alone], Barriers, str]:
     """Rests on the path of twisting, the same without grips, and why there is no pass."""
     piece, whole = scene_sector(scene, scene.sector), scene_sector(scene, "full")
     wanted = Wanted(
@@ -153,7 +153,7 @@ def _passes(
 ) -> list[_Found]:
     """Saddles of index 1 from all starts, each once, lowest first."""
     found: list[_Found] = []
-    alike = _ALIKE * abs(ends["folded"])
+    alike = ALIKE * abs(ends["folded"])
     for candidate, twisted in _candidates(rests, alone, twisting):
         if pressed:
             break
@@ -218,7 +218,7 @@ def _described(alone: Alone, energy: float, ends: dict[str, float], *, twisted: 
         )
         for sign in (1.0, -1.0)
     )
-    names = tuple(_name(side, ends) for side in sides)
+    names = tuple(name_of_rest(side, ends) for side in sides)
     saddle = Saddle(
         energy,
         alone.index(),
@@ -231,11 +231,11 @@ def _described(alone: Alone, energy: float, ends: dict[str, float], *, twisted: 
     return _Found(saddle, alone, sides)
 
 
-def _name(side: Fallen, ends: dict[str, float]) -> str:
+def name_of_rest(side: Fallen, ends: Mapping[str, float]) -> str:
     """Which rest a flow has come to."""
     if not side.rests:
         return "nowhere"
-    alike = _ALIKE * abs(ends["folded"])
+    alike = ALIKE * abs(ends["folded"])
     for name, energy in ends.items():
         if abs(side.energy - energy) < alike:
             return name

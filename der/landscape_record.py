@@ -1,52 +1,31 @@
 """What is known of a ring's energy landscape, on disk as JSON; free of kernels.
 
-Three answers of growing freedom: along the path of twisting (`Landscape`), over twist and grip
-distance (`Surface`), and of the ring left alone (`Pass`); `BarrierCurves` are those over h/t.
+Answers of growing freedom: along the path of twisting (`Landscape`), over twist and grip distance
+(`landscape_surface_record`), and of the ring left alone (`Pass`); `BarrierCurves` are those over
+h/t.
 Energies are those of the full ring in GJ/a, moments of one arm, angles in radians.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from der.checks import Array
-from der.files import FilePath, write_whole
-from der.record import Path
-
-SCHEMA = 1
-Counts = NDArray[np.int64]
-
-
-class OnDisk:
-    """A record that writes itself as JSON, one entry a line."""
-
-    def entries(self) -> dict[str, object]:
-        """What is written, by name."""
-        raise NotImplementedError
-
-    def to_json(self) -> str:
-        """JSON text of schema 1."""
-        entries = {"schema": SCHEMA, **self.entries()}
-        lines = [f'"{name}": {json.dumps(entries[name], allow_nan=False)}' for name in entries]
-        return "{\n  " + ",\n  ".join(lines) + "\n}\n"
-
-    def save(self, path: FilePath) -> None:
-        """Write JSON, whole or not at all.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written; one already there is then unharmed.
-        """
-        content = self.to_json().encode()
-        write_whole(path, lambda file: file.write(content))
-
+from der import checks
+from der.checks import Array, optional
+from der.landscape_files import (
+    Entries,
+    OnDisk,
+    errors_of,
+    seconds,
+    sentences,
+    with_errors,
+    with_nulls,
+)
+from der.record import Path, Timing, built, flat_point, point_of
 
 # --- Along the path of twisting --------------------------------------------------------------
 
@@ -68,6 +47,23 @@ class Rest:
         """Well, or saddle: whether the ring under no moment comes back when it is nudged."""
         return "well" if self.index_moment == 0 else "saddle"
 
+    @classmethod
+    def of_entries(cls, entries: Entries) -> Self:
+        """A rest as it is written; its kind follows from the rest."""
+        kind = entries.text("kind")
+        rest = cls(
+            entries.number("gamma"),
+            entries.number("energy"),
+            entries.count_or_none("index_moment"),
+            entries.count_or_none("index_free"),
+            entries.number("slope"),
+            entries.number("distance"),
+            entries.count("position"),
+        )
+        if kind != rest.kind:
+            raise ValueError(f"kind of a rest must be {rest.kind}, got {kind!r}")
+        return rest
+
 
 @dataclass(frozen=True)
 class Barriers:
@@ -77,6 +73,12 @@ class Barriers:
     open: float | None  # above the folded ring
     saddle: int | None  # which of the rests it is
     why: Mapping[str, str] = field(default_factory=dict)  # a sentence where one is None, or special
+
+    @classmethod
+    def of_entries(cls, entries: Entries) -> Self:
+        """Barriers as they are written."""
+        heights = entries.number_or_none("fold"), entries.number_or_none("open")
+        return cls(*heights, entries.count_or_none("saddle"), entries.take("why", sentences))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,18 +118,43 @@ class Landscape(OnDisk):
             "section": path.section,
             "numerics": path.numerics,
             **{name: getattr(path, name).tolist() for name in ("gamma", "energy", "moment")},
-            "index": path.index.tolist(),
-            "points": [
-                {"kind": point.kind, "gamma": point.gamma, "position": point.position}
-                for point in path.points
-            ],
+            **{name: getattr(path, name).tolist() for name in ("index", "index_moment")},
+            "points": [flat_point(point) for point in path.points],
             "rests": [{**asdict(rest), "kind": rest.kind} for rest in self.rests],
             "folded": self.folded,
-            "barriers": {"fold": self.barriers.fold, "open": self.barriers.open},
+            "barriers": {name: getattr(self.barriers, name) for name in ("fold", "open", "saddle")},
             "why": dict(self.barriers.why),
-            "extrapolated": _with_errors(self.extrapolated),
+            "extrapolated": with_errors(self.extrapolated),
             "timing": vars(path.timing),
         }
+
+    @classmethod
+    def of_entries(cls, entries: Entries) -> Self:
+        """A landscape as it is written."""
+        points = entries.take("points", lambda at, v: checks.each(at, v, point_of))
+        names = ("status", "message", "ring", "section", "numerics", "gamma", "energy", "moment")
+        path = built(
+            Path,
+            "record",
+            {name: entries.take(name, _as_it_is) for name in (*names, "index", "index_moment")}
+            | {"solver": "der", "at_pi": None, "mode": None, "error": None, "points": points}
+            | {"timing": built(Timing, "timing", entries.mapping("timing"))},
+        )
+        rests = entries.each("rests", Rest.of_entries)
+        for i, rest in enumerate(rests):
+            if rest.position >= len(path):
+                raise ValueError(f"rests[{i}].position is {rest.position} of {len(path)} states")
+        heights = entries.inside("barriers")
+        barriers = Barriers(
+            heights.number_or_none("fold"),
+            heights.number_or_none("open"),
+            heights.count_or_none("saddle"),
+            entries.take("why", sentences),
+        )
+        heights.end()
+        return cls(
+            path, rests, entries.truth("folded"), barriers, entries.take("extrapolated", errors_of)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,79 +187,38 @@ class BarrierCurves(OnDisk):
 
     def entries(self) -> dict[str, object]:
         """What is written, by name; NaN becomes null."""
-        arrays = {name: _with_nulls(getattr(self, name)) for name in self._ARRAYS}
+        arrays = {name: with_nulls(getattr(self, name)) for name in self._ARRAYS}
         return {
             "ring": self.ring,
             "numerics": self.numerics,
             **arrays,
             "index_free": list(self.index_free),
             "why": list(self.why),
-            "error": {name: _with_nulls(values) for name, values in self.error.items()} or None,
+            "error": {name: with_nulls(values) for name, values in self.error.items()} or None,
             "timing": {"solve_s": self.solve_s},
         }
 
-
-# --- Over twist and grip distance ------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Surface(OnDisk):
-    """Least energy at prescribed twist and distance of the grips; NaN where no minimum was found.
-
-    Minima are those among the shapes that have the symmetry of the ring in its grips; ``index`` is
-    that of the full ring, and where it is not 0 a way down breaks the symmetry.
-    """
-
-    ring: Mapping[str, object]
-    section: Mapping[str, object]
-    numerics: Mapping[str, object]
-    gamma: Array  # (n,) rad
-    distance: Array  # (m,) a, between the grips
-    energy: Array  # (n, m) of the lowest minimum
-    moment: Array  # (n, m) of one arm, (1/4) dU/dgamma
-    force: Array  # (n, m) dU/d(distance): tension in the grips, GJ/a^2
-    index: Counts  # (n, m) ways down, both held; -1: not known
-    minima: tuple[tuple[tuple[float, ...], ...], ...]  # (n, m) energies of all minima, ascending
-    reasons: Mapping[tuple[int, int], str]  # why a cell has none
-    path: tuple[Array, Array, Array]  # gamma, distance, energy along the path of twisting
-    folds: Array  # (k, 3) gamma, distance, energy where gamma turns back
-    rests: Array  # (k, 3) the same where M = 0 on the path
-    snaps: tuple[Array, ...]  # (k, 3) the same along each snap, up and down
-    status: str
-    message: str
-    solve_s: float
-
-    @property
-    def count(self) -> Counts:
-        """Number of minima (n, m) in each cell."""
-        return np.array([[len(cell) for cell in row] for row in self.minima], dtype=np.int64)
-
-    def entries(self) -> dict[str, object]:
-        """What is written, by name; NaN becomes null."""
-        maps = {name: _with_nulls(getattr(self, name)) for name in ("energy", "moment", "force")}
-        return {
-            "status": self.status,
-            "message": self.message,
-            "ring": self.ring,
-            "section": self.section,
-            "numerics": self.numerics,
-            "gamma": self.gamma.tolist(),
-            "distance": self.distance.tolist(),
-            **maps,
-            "index": [[None if i < 0 else i for i in row] for row in self.index.tolist()],
-            "minima": self.minima,
-            "reasons": [
-                {"gamma": float(self.gamma[i]), "distance": float(self.distance[j]), "why": why}
-                for (i, j), why in self.reasons.items()
-            ],
-            "path": dict(
-                zip(("gamma", "distance", "energy"), map(np.ndarray.tolist, self.path), strict=True)
-            ),
-            "folds": self.folds.tolist(),
-            "rests": self.rests.tolist(),
-            "snaps": [snap.tolist() for snap in self.snaps],
-            "timing": {"solve_s": self.solve_s},
-        }
+    @classmethod
+    def of_entries(cls, entries: Entries) -> Self:
+        """Curves as they are written."""
+        values = {name: entries.array(name, "n") for name in cls._ARRAYS}
+        n = len(values["h_over_t"])
+        for name, array in values.items():
+            if len(array) != n:
+                raise ValueError(f"{name} has {len(array)} entries, h_over_t has {n}")
+        indices = entries.take("index_free", lambda at, v: checks.each(at, v, _INDEX))
+        why = entries.take("why", lambda at, v: checks.each(at, v, checks.text))
+        given = entries.take("error", optional(Entries))
+        error = {} if given is None else {name: given.array(name, n) for name in given.names}
+        return cls(
+            entries.mapping("ring"),
+            entries.mapping("numerics"),
+            **values,
+            index_free=tuple(indices),
+            why=tuple(why),
+            error=error,
+            solve_s=seconds(entries),
+        )
 
 
 # --- Without grips ---------------------------------------------------------------------------
@@ -249,6 +235,19 @@ class Saddle:
     twisted: bool  # whether it is the saddle on the path of twisting itself
     ends: tuple[str, ...]  # "flat", "folded" or another rest, on the two ways down
     stiffness: float  # of the way down: its eigenvalue, GJ/a^2
+
+    @classmethod
+    def of_entries(cls, entries: Entries) -> Self:
+        """A saddle as it is written."""
+        return cls(
+            entries.number("energy"),
+            entries.count_or_none("index"),
+            entries.number("residual"),
+            entries.count("zero_modes"),
+            entries.truth("twisted"),
+            tuple(entries.take("ends", lambda at, v: checks.each(at, v, checks.text))),
+            entries.number("stiffness"),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,24 +276,49 @@ class Pass(OnDisk):
             "section": self.section,
             "numerics": self.numerics,
             "barriers": {"fold": self.fold, "open": self.open},
-            "twisting": {"fold": self.twisting.fold, "open": self.twisting.open},
+            "twisting": asdict(self.twisting),
             "saddle": None if self.saddle is None else asdict(self.saddle),
             "saddles": [asdict(saddle) for saddle in self.saddles],
             "way": {"progress": self.way[:, 0].tolist(), "energy": self.way[:, 1].tolist()},
             "why": self.why,
             "status": self.status,
-            "extrapolated": _with_errors(self.extrapolated),
+            "extrapolated": with_errors(self.extrapolated),
             "timing": {"solve_s": self.solve_s},
         }
 
+    @classmethod
+    def of_entries(cls, entries: Entries) -> Self:
+        """A pass as it is written: without the shapes on its way."""
+        heights, way = entries.inside("barriers"), entries.inside("way")
+        progress, energy = way.array("progress", "n"), way.array("energy", "n")
+        if len(progress) != len(energy):
+            raise ValueError(f"way.energy has {len(energy)} entries, progress {len(progress)}")
+        twisting = entries.inside("twisting")
+        saddle = entries.take("saddle", optional(Entries))
+        found = cls(
+            entries.mapping("ring"),
+            entries.mapping("section"),
+            entries.mapping("numerics"),
+            heights.number_or_none("fold"),
+            heights.number_or_none("open"),
+            Barriers.of_entries(twisting),
+            None if saddle is None else Saddle.of_entries(saddle),
+            entries.each("saddles", Saddle.of_entries),
+            np.column_stack([progress, energy]),
+            np.zeros((0, 0, 3)),
+            entries.text("why"),
+            entries.text("status"),
+            entries.take("extrapolated", errors_of),
+            seconds(entries),
+        )
+        for part in (heights, way, twisting, *((saddle,) if saddle is not None else ())):
+            part.end()
+        return found
 
-def _with_nulls(values: Array) -> object:
-    """Nested lists with None for NaN."""
-    if values.ndim > 1:
-        return [_with_nulls(row) for row in values]
-    return [None if np.isnan(value) else float(value) for value in values]
+
+def _as_it_is(name: str, given: object) -> object:
+    """An entry that is checked where it is used."""
+    return given
 
 
-def _with_errors(values: Mapping[str, tuple[float, float]]) -> object:
-    """Objects of value and error; None without any."""
-    return {n: {"value": v, "error": e} for n, (v, e) in values.items()} or None
+_INDEX = optional(checks.count)

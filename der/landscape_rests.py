@@ -37,7 +37,9 @@ def with_rests(
             before = line[-1].at
             if before.moment * one.at.moment < 0.0:
                 rests.append(len(line))
-                line.append(visit(piece, wanted, _between(piece, wanted, tally, before, one.at)))
+                line.append(
+                    visit(piece, wanted, without_moment(piece, wanted, tally, before, one.at))
+                )
         if here:
             rests.append(len(line))
         line.append(one)
@@ -49,10 +51,16 @@ def _is_at_rest(one: Visit, rounding: float) -> bool:
     return one.at.state.load in (0.0, math.pi) and abs(one.at.moment) <= rounding
 
 
-def _between(
+def without_moment(
     piece: Sector, wanted: Wanted, tally: Tally, a: Equilibrium, b: Equilibrium
 ) -> Equilibrium:
-    """The equilibrium with M = 0 between two neighbouring states of a path."""
+    """The equilibrium with M = 0 between two neighbouring states of a path.
+
+    Raises
+    ------
+    Stuck
+        Where it cannot be solved for.
+    """
     step = Step(piece, a, b, 1.0, wanted.tolerance, tally)
     step = replace(step, length=dot(piece.body, a.tangent, step.jump))
     return step.at(root(lambda s: step.at(s).moment, 0.0, step.length))

@@ -22,8 +22,8 @@ from der.equilibrium import Equilibrium
 from der.frames import Array
 from der.landscape_curve import FARTHEST, distance, numerics, scene_sector
 from der.landscape_flood import Cell, Flood, shaken, spread
-from der.landscape_record import Surface
 from der.landscape_rests import with_rests
+from der.landscape_surface_record import Surface
 from der.path import follow
 from der.rod import State
 from der.scene import Scene

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from der.landscape_record import Landscape, Pass, Surface
+from der.landscape_push_record import Instant, LeastPush, Push
+from der.landscape_record import Landscape, Pass
+from der.landscape_surface_record import Surface
 from der.summary import headline
 
 
-def words(found: Landscape | Surface | Pass) -> str:
-    """Rests and barriers, or what a surface or a pass has to say."""
+def words(found: Landscape | Surface | Pass | LeastPush) -> str:
+    """Rests and barriers, or what a surface, a pass or a push has to say."""
     if isinstance(found, Landscape):
         return _landscape(found)
     if isinstance(found, Surface):
         return _surface(found)
+    if isinstance(found, LeastPush):
+        return _pushes(found)
     return _pass(found)
 
 
@@ -76,3 +80,44 @@ def _pass(found: Pass) -> str:
     if found.why:
         lines.append(found.why)
     return "\n".join(lines)
+
+
+_EVENTS = {
+    "pass": "carried to a pass",
+    "fold": "snaps at a fold",
+    "branch": "snaps at a branch point",
+    "limit": "limit of the load",
+    "end": "end",
+}
+
+
+def _pushes(found: LeastPush) -> str:
+    lines = [
+        f"{len(found.pushes)} pushes at pairs of {found.numerics['points']} points and between"
+    ]
+    for name, places, dead in (("slow", found.least, False), ("dead", found.least_dead, True)):
+        for kind, k in places.items():
+            one = found.pushes[k]
+            instant = one.dead if dead else one.held
+            if instant is not None:
+                lines.append(_push(f"{name} {kind}", one, instant))
+                key = f"{kind} dead" if dead else kind
+                if key in found.extrapolated:
+                    height, error = found.extrapolated[key]
+                    lines.append(f"    work without mesh {height:.8g} +- {error:.1e}")
+    for name, value in (("left alone", found.barrier), ("by twisting", found.twisting)):
+        text = "none" if value is None else f"{value:.8g} on the mesh"
+        lines.append(f"barrier to open {name}: {text}")
+    if found.why:
+        lines.append(found.why)
+    return "\n".join(lines)
+
+
+def _push(name: str, one: Push, at: Instant) -> str:
+    ways = "/".join("?" if i is None else str(i) for i in (at.index_before, at.index_after))
+    places = ", ".join(f"{s:.5g}" for s in one.points)
+    return (
+        f"{name + ':':13}work {at.work:.8g}, load {at.load:.5g} (largest {one.peak:.5g}), "
+        f"push {at.push:.5g}; s/L = {places}, {one.direction}; {_EVENTS[at.event]}, "
+        f"ways down {ways}, let go: {at.lands}"
+    )

@@ -198,7 +198,7 @@ class Path:
             entries[name] = getattr(self, name)
         for name in ARRAYS:
             entries[name] = getattr(self, name).tolist()  # masked becomes None
-        entries["points"] = [_flat_point(point) for point in self.points]
+        entries["points"] = [flat_point(point) for point in self.points]
         entries["at_pi"] = None if self.at_pi is None else vars(self.at_pi)
         entries["mode"] = None if self.mode is None else vars(self.mode)
         entries["error"] = self.error
@@ -228,14 +228,14 @@ class Path:
         if not isinstance(entries.get("points"), list):
             raise ValueError("points is missing or not a list")
         points = enumerate(entries["points"])
-        entries["points"] = [_point(f"points[{i}]", point) for i, point in points]
+        entries["points"] = [point_of(f"points[{i}]", point) for i, point in points]
         for name, kind in (("at_pi", AtPi), ("mode", Mode)):
             if entries.get(name) is not None:
-                entries[name] = _build(kind, name, entries[name])
-        entries["timing"] = _build(Timing, "timing", entries.get("timing"))
+                entries[name] = built(kind, name, entries[name])
+        entries["timing"] = built(Timing, "timing", entries.get("timing"))
         if "shapes" in entries:
             raise ValueError("shapes have no place in the JSON")
-        path: Path = _build(cls, "record", entries)
+        path: Path = built(cls, "record", entries)
         return path
 
     def save(self, path: FilePath) -> None:
@@ -324,23 +324,24 @@ def _check(record: object, check: Callable[[str, Any], object], *names: str) -> 
         object.__setattr__(record, name, check(name, getattr(record, name)))
 
 
-def _flat_point(point: Point) -> dict[str, object]:
+def flat_point(point: Point) -> dict[str, object]:
+    """A special point as it is written, its details among its entries."""
     entries = dict(vars(point))
     return entries | entries.pop("details")
 
 
-def _point(where: str, entries: Any) -> Point:
+def point_of(where: str, entries: Any) -> Point:
     """Point of its JSON object, whose surplus entries are the details."""
     if not isinstance(entries, dict):
         raise ValueError(f"{where} is {entries!r}, not an object")
     own = {entry.name for entry in fields(Point)} - {"details"}
     known = {name: value for name, value in entries.items() if name in own}
     details = {name: value for name, value in entries.items() if name not in own}
-    point: Point = _build(Point, where, known | {"details": details})
+    point: Point = built(Point, where, known | {"details": details})
     return point
 
 
-def _build(kind: Callable[..., Any], where: str, entries: Any) -> Any:
+def built(kind: Callable[..., Any], where: str, entries: Any) -> Any:
     """Record of a JSON object; a missing, surplus or wrong entry is refused with its place."""
     if not isinstance(entries, dict):
         raise ValueError(f"{where} is {entries!r}, not an object")

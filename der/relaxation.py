@@ -333,10 +333,20 @@ def relax(
     most : gradients to be evaluated at most.
     every : keep every k-th configuration in `Relaxed.history`; 0: none.
 
+    Raises
+    ------
+    ValueError
+        For a rod with an edge that nothing bends, such as a strut: it has no masses to move with.
+
     Notes
     -----
     Failure to come to rest is a value: see `Relaxed.outcome` and `ADVICE`.
     """
+    if body.n_edges > len(body.cell) + 1:
+        raise ValueError(
+            f"body must have no more than {len(body.cell) + 1} edges on {len(body.cell)} vertices "
+            f"to be relaxed, got {body.n_edges}: a strut falls by implicit steps (gradient_flow)"
+        )
     if kick is not None:
         start = moved(held, start, kick)
     n, b = held.free.shape

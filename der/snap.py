@@ -30,6 +30,7 @@ _NEAR = 1e-2  # rad, before a stop: what rests there is looked for by Newton's m
 _MEETS = 1e-9  # rad, of a stop: nearer is on it
 _SOFT = 3  # modes nearest to zero that are looked at
 _FALLS = 8  # relaxations of one snap at most
+TO_AND_FRO = "its dead moment sends it to its stop and back again"
 
 
 @dataclass(frozen=True)
@@ -217,7 +218,7 @@ def _fall(drop: _Drop, kick: Direction, moment: float | None) -> tuple[list[Rela
     piece = drop.piece
     fallen: list[Relaxed] = []
     start = moved(piece.held, drop.before.state, kick)
-    tolerance, reason = _TOLERANCE, ""
+    tolerance, reason = _TOLERANCE, TO_AND_FRO
     pressing = moment  # against the stop, once it is reached
     for _ in range(_FALLS):
         fallen.append(drop.relaxed(start, moment, tolerance))

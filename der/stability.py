@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from der.assembly import assemble, position_rows, take_out
+from der.assembly import assemble, lengthened, position_rows, take_out
 from der.block_ldl import factor, inertia, solve_band, solve_refined
 from der.dense import solve_dense
 from der.frames import Array
@@ -42,7 +42,8 @@ def _class_matrix(rod, held, modes, quat, stretch, force, load):
     n, b = held.free.shape
     n_c = modes.axis.shape[0]
     border = np.zeros((n, b, n_c))
-    position_rows(rod.length, modes.weight, modes.axis, quat, stretch, np.zeros(n_c), border)
+    strain = lengthened(rod, held, stretch, load)
+    position_rows(rod.length, modes.weight, modes.axis, quat, strain, np.zeros(n_c), border)
     return take_out(modes.free, system.diag, system.off, border)
 
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from dataclasses import asdict, dataclass, field
+from typing import Self
 
 from der import checks
-from der.files import FilePath
-from der.landscape_record import SCHEMA, OnDisk
+from der.landscape_files import Entries, OnDisk, seconds
 from der.shapes import Shapes
 
 STATUSES = ("done", "interrupted", "not converged")
@@ -125,104 +122,55 @@ class States(OnDisk):
         }
 
     @classmethod
-    def from_json(cls, text: str) -> States:
-        """The record that `to_json` wrote; without shapes.
-
-        Raises
-        ------
-        ValueError
-            If the text is not such a record.
-        """
-        try:
-            entries = checks.json_object("states", json.loads(text))
-        except json.JSONDecodeError as wrong:
-            raise ValueError(f"states must be JSON: {wrong}") from None
-        if entries.pop("schema", None) != SCHEMA:
-            raise ValueError(f"schema of states must be {SCHEMA}")
-        timing = _object("timing", entries.pop("timing", None), {"solve_s"})
-        expected = {f.name for f in fields(cls)} - {"shapes", "solve_s"}
-        if set(entries) != expected:
-            raise ValueError(f"states must have entries {sorted(expected)}, got {sorted(entries)}")
-        gamma = checks.optional(checks.checked_number)("gamma", entries["gamma"])
+    def of_entries(cls, entries: Entries) -> Self:
+        """The states as they are written: without the shapes."""
         return cls(
-            checks.json_object("ring", entries["ring"]),
-            checks.json_object("section", entries["section"]),
-            checks.json_object("numerics", entries["numerics"]),
-            gamma,
-            tuple(checks.each("states", entries["states"], _state)),
-            tuple(checks.each("transitions", entries["transitions"], _transition)),
-            checks.count("tried", entries["tried"]),
-            checks.count("nowhere", entries["nowhere"]),
-            checks.count("peaks", entries["peaks"]),
-            checks.text("status", entries["status"]),
-            checks.text("message", entries["message"]),
-            checks.checked_number("solve_s", timing["solve_s"]),
+            entries.mapping("ring"),
+            entries.mapping("section"),
+            entries.mapping("numerics"),
+            entries.number_or_none("gamma"),
+            entries.each("states", _state),
+            entries.each("transitions", _transition),
+            entries.count("tried"),
+            entries.count("nowhere"),
+            entries.count("peaks"),
+            entries.text("status"),
+            entries.text("message"),
+            seconds(entries),
         )
 
-    @classmethod
-    def load(cls, path: FilePath) -> States:
-        """The record in a JSON file.
 
-        Raises
-        ------
-        OSError
-            If the file cannot be read.
-        ValueError
-            If it is not such a record.
-        """
-        with open(path, encoding="utf-8") as file:
-            try:
-                return cls.from_json(file.read())
-            except ValueError as wrong:
-                raise ValueError(f"{os.fspath(path)}: {wrong}") from wrong
+def _state(entries: Entries) -> RingState:
+    return RingState(
+        entries.text("name"),
+        entries.number("energy"),
+        entries.count_or_none("index"),
+        entries.number("residual"),
+        entries.truth("planar"),
+        entries.take("covering", checks.optional(_whole)),
+        entries.take("link", checks.optional(_whole)),
+        entries.number_or_none("writhe"),
+        entries.number("twist"),
+        entries.truth("needs_cut"),
+        entries.count("images"),
+        entries.count_or_none("repeats"),
+        entries.count("zero_modes"),
+        entries.number_or_none("moment"),
+        entries.number_or_none("distance"),
+    )
+
+
+def _transition(entries: Entries) -> Transition:
+    return Transition(
+        entries.text("start"),
+        entries.take("end", checks.optional(checks.text)),
+        entries.number("stiffness"),
+        entries.take("sign", _whole),
+        tuple(entries.take("via", lambda name, value: checks.each(name, value, checks.text))),
+        entries.number_or_none("released"),
+    )
 
 
 def _whole(name: str, value: object) -> int:
     """A whole number of either sign."""
-    number = checks.checked_number(name, value, "a whole number", float.is_integer)
-    return int(number)
-
-
-_CHECKS: Mapping[str, Any] = {
-    "name": checks.text,
-    "energy": checks.checked_number,
-    "index": checks.optional(checks.count),
-    "residual": checks.checked_number,
-    "planar": checks.truth,
-    "covering": checks.optional(_whole),
-    "link": checks.optional(_whole),
-    "writhe": checks.optional(checks.checked_number),
-    "twist": checks.checked_number,
-    "needs_cut": checks.truth,
-    "images": checks.count,
-    "repeats": checks.optional(checks.count),
-    "zero_modes": checks.count,
-    "moment": checks.optional(checks.checked_number),
-    "distance": checks.optional(checks.checked_number),
-    "start": checks.text,
-    "end": checks.optional(checks.text),
-    "stiffness": checks.checked_number,
-    "sign": _whole,
-    "via": lambda name, value: checks.each(name, value, checks.text),
-    "released": checks.optional(checks.checked_number),
-}
-
-
-def _object(name: str, value: object, expected: set[str]) -> dict[str, Any]:
-    entries = checks.json_object(name, value)
-    if set(entries) != expected:
-        raise ValueError(f"{name} must have entries {sorted(expected)}, got {sorted(entries)}")
-    return entries
-
-
-def _checked(name: str, value: object, kind: type) -> dict[str, Any]:
-    entries = _object(name, value, {f.name for f in fields(kind)})
-    return {key: _CHECKS[key](f"{name}.{key}", entry) for key, entry in entries.items()}
-
-
-def _state(name: str, value: object) -> RingState:
-    return RingState(**_checked(name, value, RingState))
-
-
-def _transition(name: str, value: object) -> Transition:
-    return Transition(**_checked(name, value, Transition))
+    return int(checks.checked_number(name, value, "a whole number", float.is_integer))

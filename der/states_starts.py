@@ -24,7 +24,7 @@ import numpy as np
 from der.frames import Array, turned
 from der.landscape_alone import Alone, balance, left_alone
 from der.landscape_curve import FARTHEST, scene_sector
-from der.landscape_free import twisted
+from der.landscape_free import twisted_rests
 from der.landscape_saddles import displaced
 from der.path import follow
 from der.scene import Scene
@@ -52,7 +52,7 @@ def free_starts(scene: Scene, whole: Sector) -> Iterator[Alone]:
         if tilt is not None:
             yield covered(whole, turns, tilt)
     yield eight(whole, 0.5 * math.pi)
-    yield from twisted(scene)[1]
+    yield from twisted_rests(scene)[1]
 
 
 def gripped_starts(scene: Scene, whole: Sector, gamma: float) -> Iterator[Alone]:

@@ -1,12 +1,13 @@
 """Supports and loads of a rod: which unknowns are held, which positions, what the load turns.
 
-Everything a rod is attached to is said in four ways, all linear in what the kernels see:
+Everything a rod is attached to is said in five ways, all linear in what the kernels see:
 
 * ``free``   which entries of an edge's increment may move (a clamped or gripped edge: none);
 * ``axis``, ``weight``  conditions on positions, sum_j weight[k, j] e_j . axis[k] = target[k];
 * ``turn``   how fast the load turns an edge's frame about the fixed ``turn_axis``;
 * ``pull``   how fast the load adds a dead force to the tension resultant of an edge: a dead force
-  P at the end of a rod that starts at rest is pull[j] = P on every edge before it.
+  P at the end of a rod that starts at rest is pull[j] = P on every edge before it;
+* ``reach``  how fast the load lengthens an edge: that of a strut, which pushes two points apart.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ class Supports(NamedTuple):
     turn: Array  # (n,) rotation of the edge about turn_axis per unit of load
     turn_axis: Array  # (3,)
     pull: Array  # (n, 3) dead force per unit of load
+    reach: Array  # (n,) length of the edge per unit of load, beyond its own
 
 
 def supports(
@@ -40,6 +42,7 @@ def supports(
     turn: dict[int, float] | None = None,
     turn_axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
     pull: Array | None = None,
+    reach: dict[int, float] | None = None,
 ) -> Supports:
     """Supports of an open rod or a ring.
 
@@ -49,11 +52,13 @@ def supports(
     held : conditions (weight (n,), axis (3,), target): weighted sum of edge vectors along an axis.
     turn : rotation per unit of load about ``turn_axis`` of some clamped edges.
     pull : (n, 3) or (3,) dead force per unit of load.
+    reach : length per unit of load that some edges have beyond their own.
 
     Raises
     ------
     ValueError
-        Where an edge turns that is not clamped: its frame would be both free and prescribed.
+        Where an edge turns that is not clamped: its frame would be both free and prescribed; or
+        where one turns that lengthens, too.
     """
     n = body.n_edges
     free = np.ones((n, body.block), dtype=bool)
@@ -63,6 +68,11 @@ def supports(
         if free[j].any():
             raise ValueError(f"edge {j} turns with the load but is not clamped")
         rates[j] = rate
+    longer = np.zeros(n)
+    for j, rate in (reach or {}).items():
+        if rates[j] != 0.0:
+            raise ValueError(f"edge {j} turns with the load and cannot lengthen with it, too")
+        longer[j] = rate
     force = np.zeros((n, 3))
     if pull is not None:
         force[:] = pull
@@ -74,6 +84,7 @@ def supports(
         rates,
         np.array(turn_axis, dtype=float),
         force,
+        longer,
     )
 
 

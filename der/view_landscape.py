@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from pathlib import Path as File
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -19,13 +17,20 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
 from der.checks import Array
 from der.curve import stretches
-from der.files import FilePath, write_whole
-from der.landscape_record import BarrierCurves, Landscape, Pass, Rest, Surface
+from der.landscape_record import BarrierCurves, Landscape, Pass, Rest
+from der.landscape_surface_record import Surface
+from der.view_style import (
+    INK,
+    QUIET,
+    STABLE,
+    TITLE,
+    UNSTABLE,
+    blank,
+    dress,
+    seen,
+    title,
+)
 
-FORMATS = (".png", ".pdf", ".svg")
-DPI = 150
-INK, QUIET = "#222222", "#8a8a8a"
-STABLE, UNSTABLE, FREE = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito
 BRANCHES: Mapping[object, tuple[str, str, Any]] = {
     True: ("stable ($\\gamma$ held)", STABLE, "-"),
     False: ("unstable ($\\gamma$ held)", UNSTABLE, (0, (3.5, 1.6))),
@@ -33,28 +38,9 @@ BRANCHES: Mapping[object, tuple[str, str, Any]] = {
 }
 RESTS = {"well": ("well", "o", INK), "saddle": ("saddle", "^", "white")}
 HALO = [withStroke(linewidth=2.5, foreground="white")]
-UNITS = {"vertex_angle": "°"}
 LEVELS = 28  # of a filled contour
-RINGS, ACROSS = 6, 200  # rings on a pass, points along each
+RINGS = 6  # on a pass
 CEILING = 1.35  # of the path's largest energy: what lies above is one colour
-
-
-def save_figure(figure: Figure, file: FilePath) -> None:
-    """Write a figure, whole or not at all, in the format of the file's suffix.
-
-    Raises
-    ------
-    ValueError
-        If the suffix is not one of FORMATS or the place cannot be written to.
-    """
-    suffix = File(file).suffix.lower()
-    if suffix not in FORMATS:
-        raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
-    try:
-        write_whole(file, lambda opened: figure.savefig(opened, format=suffix[1:]))
-    except OSError as problem:
-        reason = problem.strerror or problem
-        raise ValueError(f"plot {str(file)!r} cannot be written: {reason}") from problem
 
 
 # --- Along the path --------------------------------------------------------------------------
@@ -72,8 +58,8 @@ def figure_of_landscape(landscape: Landscape) -> Figure:
     if not len(path):
         raise ValueError("landscape must have at least one state to be plotted, got none")
     zoomed = landscape.barriers.open is not None
-    figure = _figure((8.6, 4.6) if zoomed else (6.0, 4.6))
-    figure.text(0.5, 0.965, _title(path.ring, path.section, path.numerics), **_TITLE)
+    figure = blank((8.6, 4.6) if zoomed else (6.0, 4.6))
+    figure.text(0.5, 0.965, title(path.ring, path.section, path.numerics), **TITLE)
     grid = figure.add_gridspec(
         2,
         2 if zoomed else 1,
@@ -94,7 +80,7 @@ def figure_of_landscape(landscape: Landscape) -> Figure:
     ):
         _branches(panel, landscape, height)
         _rests(panel, landscape.rests, height)
-        _dress(panel, label)
+        dress(panel, label)
     above.tick_params(labelbottom=False)
     below.axhline(0.0, color=QUIET, linewidth=0.6, zorder=0)
     below.set_xlabel("rotation of a grip  $\\gamma/\\pi$", fontsize=9, color=INK)
@@ -179,7 +165,7 @@ def _saddle_and_well(panel: Axes, landscape: Landscape) -> None:
             path_effects=HALO,
             zorder=6,
         )
-    _dress(panel, "energy  $U\\,a/GJ$")
+    dress(panel, "energy  $U\\,a/GJ$")
     panel.set_xlabel("$\\gamma/\\pi$", fontsize=9, color=INK)
     panel.ticklabel_format(useOffset=False)
     panel.xaxis.set_major_locator(MaxNLocator(5))
@@ -190,8 +176,8 @@ def _saddle_and_well(panel: Axes, landscape: Landscape) -> None:
 
 def figure_of_barriers(curves: BarrierCurves) -> Figure:
     """Barriers to fold, above, and to open, below, over h/t: in grips, and left alone."""
-    figure = _figure((6.2, 5.0))
-    figure.text(0.53, 0.965, _title(curves.ring, {}, curves.numerics), **_TITLE)
+    figure = blank((6.2, 5.0))
+    figure.text(0.53, 0.965, title(curves.ring, {}, curves.numerics), **TITLE)
     grid = figure.add_gridspec(
         2, 1, left=0.12, right=0.97, bottom=0.145, top=0.915, height_ratios=(1.0, 1.25), hspace=0.07
     )
@@ -214,8 +200,8 @@ def figure_of_barriers(curves: BarrierCurves) -> Figure:
     handles.append(
         Line2D([], [], color=QUIET, linestyle=":", linewidth=1.0, label="energy of the folded ring")
     )
-    _dress(above, "to fold  $\\Delta U\\,a/GJ$")
-    _dress(below, "to open  $\\Delta U\\,a/GJ$")
+    dress(above, "to fold  $\\Delta U\\,a/GJ$")
+    dress(below, "to open  $\\Delta U\\,a/GJ$")
     above.tick_params(labelbottom=False)
     below.axhline(0.0, color=QUIET, linewidth=0.6, zorder=0)
     for panel in (above, below):
@@ -243,8 +229,8 @@ def figure_of_surface(surface: Surface) -> Figure:
     """
     if not np.any(np.isfinite(surface.energy)):
         raise ValueError("surface must have a minimum in some cell to be plotted, got none")
-    figure = _figure((10.4, 4.7))
-    figure.text(0.5, 0.965, _title(surface.ring, surface.section, surface.numerics), **_TITLE)
+    figure = blank((10.4, 4.7))
+    figure.text(0.5, 0.965, title(surface.ring, surface.section, surface.numerics), **TITLE)
     panel = figure.add_axes((0.06, 0.175, 0.42, 0.74))
     x, y = surface.gamma / math.pi, surface.distance
     ceiling = CEILING * float(np.nanmax(surface.path[2]))
@@ -254,7 +240,7 @@ def figure_of_surface(surface: Surface) -> Figure:
     filled = panel.contourf(x, y, values, levels, cmap="YlGnBu_r", norm=norm, extend="max")
     panel.contour(x, y, values, levels, colors=INK, linewidths=0.35, alpha=0.35)
     handles = [*_several(panel, surface), *_overlay(panel, surface)]
-    _dress(panel, "distance of the grips  $d/a$")
+    dress(panel, "distance of the grips  $d/a$")
     panel.margins(0.0)
     panel.set_xlim(float(x[0]), float(x[-1]))
     panel.set_ylim(float(y[0]), float(y[-1]))
@@ -379,8 +365,8 @@ def figure_of_pass(found: Pass) -> Figure:
     """
     if found.saddle is None or found.fold is None or found.open is None:
         raise ValueError(f"pass must have a saddle to be plotted: {found.why}")
-    figure = _figure((7.6, 5.0))
-    figure.text(0.5, 0.965, _title(found.ring, found.section, found.numerics), **_TITLE)
+    figure = blank((7.6, 5.0))
+    figure.text(0.5, 0.965, title(found.ring, found.section, found.numerics), **TITLE)
     panel = figure.add_axes((0.085, 0.115, 0.895, 0.53))
     panel.margins(x=0.11)
     progress, energy = found.way.T
@@ -390,7 +376,7 @@ def figure_of_pass(found: Pass) -> Figure:
     for k, kind in ends:
         _, marker, face = RESTS[kind]
         panel.plot(progress[k], energy[k], zorder=5, clip_on=False, **_mark(marker, face))
-    _dress(panel, "energy  $U\\,a/GJ$")
+    dress(panel, "energy  $U\\,a/GJ$")
     panel.set_xlabel(
         "way down both sides of the saddle  [rad, root mean square]", fontsize=9, color=INK
     )
@@ -433,7 +419,7 @@ def _rings(row: Axes, found: Pass) -> None:
     """Rings on the way, each over its place on the curve below, in one scale."""
     chosen = np.linspace(0, len(found.shapes) - 1, RINGS).round().astype(int)
     end = float(found.way[-1, 0])
-    views = [_view(found.shapes[k]) for k in chosen]
+    views = [seen(found.shapes[k]) for k in chosen]
     widest = max(float(np.ptp(view[:, 0])) for view in views)
     scale = 0.86 * end / (RINGS - 1) / widest
     for i, view in enumerate(views):
@@ -448,66 +434,11 @@ def _rings(row: Axes, found: Pass) -> None:
     row.set_axis_off()
 
 
-def _view(x: Array) -> Array:
-    """Smooth closed curve (n, 3) through vertices: to the right, up and towards the reader.
-
-    The ring is seen from 40 degrees off the normal of the plane to which it is closest.
-    """
-    from scipy.interpolate import CubicSpline
-
-    n = len(x)
-    curve = CubicSpline(np.arange(n + 1), np.append(x, x[:1], axis=0), bc_type="periodic")
-    fine = curve(np.linspace(0.0, n, ACROSS + 1))
-    centred = fine - fine.mean(axis=0)
-    right, up, towards = np.linalg.svd(centred, full_matrices=False)[2]
-    tilt = math.radians(40.0)
-    seen_up = math.cos(tilt) * up + math.sin(tilt) * towards
-    seen_towards = -math.sin(tilt) * up + math.cos(tilt) * towards
-    return np.asarray(centred @ np.stack([right, seen_up, seen_towards], axis=1))
-
-
 # --- Pieces ----------------------------------------------------------------------------------
-
-_TITLE: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9.5, "color": INK}
-
-
-def _figure(size: tuple[float, float]) -> Figure:
-    figure = Figure(figsize=size, dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _title(
-    ring: Mapping[str, object], section: Mapping[str, object], numerics: Mapping[str, object]
-) -> str:
-    """Ring, section and mesh in one line."""
-    words = [str(ring["shape"])]
-    words += [
-        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}{UNITS.get(name, '')}"
-        for name, value in ring.items()
-        if isinstance(value, float) and (name, value) != ("natural_curvature", 1.0)
-    ]
-    if ring.get("twist_axis") == "y":
-        words.append("about y")
-    parts = [", ".join(words)]
-    if section.get("h_over_t") is not None:
-        parts.append(f"h/t = {section['h_over_t']:g}")
-    elif section:
-        parts.append(rf"$\alpha$ = {section['alpha']:.4g}, $\beta$ = {section['beta']:.4g}")
-    edges = f"{numerics.get('n_edges')} edges"
-    parts.append(f"extrapolated from {edges}" if numerics.get("error_bars") else edges)
-    return "   |   ".join(parts)
 
 
 def _number(value: float | None) -> str:
     return "none" if value is None else f"{value:.5g}"
-
-
-def _dress(panel: Axes, label: str) -> None:
-    panel.set_ylabel(label, fontsize=9, color=INK)
-    panel.tick_params(labelsize=8, color=QUIET, labelcolor=INK, direction="in")
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.spines[["left", "bottom"]].set_color(QUIET)
 
 
 def _mark(marker: str, face: str) -> dict[str, Any]:

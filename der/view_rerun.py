@@ -20,7 +20,8 @@ from der.captions import about, names, title
 from der.checks import Array
 from der.files import FilePath, write_whole
 from der.film import Playback, playback
-from der.landscape_record import Landscape, Surface
+from der.landscape_record import Landscape
+from der.landscape_surface_record import Surface
 from der.panel import HIGH, Panel
 from der.record import Path
 from der.tween import in_step

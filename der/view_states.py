@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterator, Mapping
-from pathlib import Path as File
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -18,15 +16,10 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.ticker import MaxNLocator
 
 from der.checks import Array
-from der.files import FilePath, write_whole
 from der.projection import Camera, seen
 from der.states_record import RingState, States
+from der.view_style import BAR, DPI, INK, QUIET, STABLE, TITLE, UNSTABLE, about, blank
 
-FORMATS = (".png", ".pdf", ".svg")
-DPI = 150
-INK, QUIET = "#222222", "#8a8a8a"
-STABLE, UNSTABLE = "#0072B2", "#D55E00"  # Okabe and Ito
-UNITS = {"vertex_angle": "°"}
 MOST = 14  # states in one picture, the lowest
 COLUMN, NARROWEST, HEIGHT = 0.98, 5.2, 6.3  # inches
 HALF_WIDTH = 0.1  # of a ribbon, over the ring's mean radius: exaggerated, to be seen
@@ -36,24 +29,6 @@ _ZERO = 1e-9  # GJ/a: rounding
 APART = 0.22  # of the radius: how far the strands of a covered ring are drawn apart
 TILT = math.radians(42.0)  # of the view off the normal of the plane closest to a shape
 LIGHT = np.array([0.35, 0.45, 0.82])  # on paper: right, up, towards the reader
-
-
-def save_figure(figure: Figure, file: FilePath) -> None:
-    """Write a figure, whole or not at all, in the format of the file's suffix.
-
-    Raises
-    ------
-    ValueError
-        If the suffix is not one of FORMATS or the place cannot be written to.
-    """
-    suffix = File(file).suffix.lower()
-    if suffix not in FORMATS:
-        raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
-    try:
-        write_whole(file, lambda opened: figure.savefig(opened, format=suffix[1:]))
-    except OSError as problem:
-        reason = problem.strerror or problem
-        raise ValueError(f"plot {str(file)!r} cannot be written: {reason}") from problem
 
 
 def figure_of_states(found: States) -> Figure:
@@ -71,9 +46,8 @@ def figure_of_states(found: States) -> Figure:
     shown = found.states[:MOST]
     n = len(shown)
     width = max(NARROWEST, COLUMN * n + 0.9)
-    figure = Figure(figsize=(width, HEIGHT), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    figure.text(0.5, 0.97, _title(found), ha="center", va="center", fontsize=9.5, color=INK)
+    figure = blank((width, HEIGHT))
+    figure.text(0.5, 0.97, _title(found), **TITLE)
     left, right = 0.68 / width, 1.0 - 0.12 / width
     row = figure.add_axes((left, 0.645, right - left, 0.3))
     graph = figure.add_axes((left, 0.085, right - left, 0.54))
@@ -86,24 +60,13 @@ def figure_of_states(found: States) -> Figure:
 
 
 def _title(found: States) -> str:
-    """Ring, section, grips and mesh in one line."""
-    words = [str(found.ring["shape"])]
-    words += [
-        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}{UNITS.get(name, '')}"
-        for name, value in found.ring.items()
-        if isinstance(value, float)
-    ]
-    parts = [", ".join(words)]
-    if found.section.get("h_over_t") is not None:
-        parts.append(f"h/t = {found.section['h_over_t']:g}")
-    else:
-        alpha, beta = found.section["alpha"], found.section["beta"]
-        parts.append(rf"$\alpha$ = {alpha:.4g}, $\beta$ = {beta:.4g}")
+    """Ring, section, grips and what is left out in one line."""
     free = found.gamma is None
+    parts = about(found.ring, found.section)
     parts.append("free in space" if free else rf"in grips, $\gamma$ = {found.gamma:.4g}")
     if len(found) > MOST:
         parts.append(f"the lowest {MOST} of {len(found)} states")
-    return "   |   ".join(parts)
+    return BAR.join(parts)
 
 
 # --- Pictures --------------------------------------------------------------------------------

@@ -10,7 +10,8 @@ import rerun as rr
 
 from der.checks import Array
 from der.film import Playback, middles
-from der.landscape_record import Landscape, Rest, Surface
+from der.landscape_record import Landscape, Rest
+from der.landscape_surface_record import Surface
 from der.panel import Panel
 from der.ribbon import viridis
 from der.view_panels import send_axes, send_curve, send_labels

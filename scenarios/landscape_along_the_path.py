@@ -32,7 +32,8 @@ beside = barriers_over(der.circle(), BESIDE, n_edges=128)
 threshold = float(np.polyval(np.polyfit(np.sqrt(beside.open), BESIDE, 3), 0.0))
 
 if __name__ == "__main__":
-    from der.view_landscape import figure_of_barriers, figure_of_landscape, save_figure
+    from der.view_landscape import figure_of_barriers, figure_of_landscape
+    from der.view_style import save_figure
 
     place = folder("landscape_along_the_path")
     one.save(place / "landscape.json")

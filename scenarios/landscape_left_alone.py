@@ -29,7 +29,8 @@ twisted = landscape(scene)
 found = free_barrier(scene)
 
 if __name__ == "__main__":
-    from der.view_landscape import figure_of_barriers, figure_of_pass, save_figure
+    from der.view_landscape import figure_of_barriers, figure_of_pass
+    from der.view_style import save_figure
 
     place = folder("landscape_left_alone")
     found.save(place / "pass.json")

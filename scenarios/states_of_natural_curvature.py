@@ -104,7 +104,8 @@ on_mesh = {
 
 def main() -> None:
     """Search over the natural curvature, draw, and say how far the thresholds are off."""
-    from der.view_states import figure_of_states, save_figure
+    from der.view_states import figure_of_states
+    from der.view_style import save_figure
     from scenarios.states_plot import figure_over_curvature
 
     place = folder("states_of_natural_curvature")

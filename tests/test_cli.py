@@ -191,6 +191,8 @@ WRONG = [
     (("compare", *line()[1:], "--edges", "24"), "--edges", "24", "divisible by 16"),
     (("landscape", *line()[1:], "--edges", "20"), "--edges", "20", "divisible by 16"),
     (("landscape", *line()[1:], "--free", "--two-dimensional"), "--free", "both", "together"),
+    (("landscape", *line()[1:], "--push", "--free"), "--push", "both", "--free"),
+    (("landscape", *line()[1:], "--push", "--two-dimensional"), "--push", "both", "together"),
     (("landscape", *line()[1:], "--cells", "2"), "--cells", "2", "from 3 to 1000"),
     (("phase", "square", "--out", "d"), "SHAPE", "'square'", "ellipse"),
     (("phase", "ellipse", "--out", "d", "--check", "rod"), "--check", "'rod'", "'der'"),
@@ -704,3 +706,13 @@ def test_two_dimensional_landscape_is_written(run, tmp_path):
     assert "5 x 5 cells" in out
     assert len(entries((tmp_path / "new" / "landscape.json").read_text())["energy"]) == 5
     assert (tmp_path / "new" / "landscape.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_push_at_a_ring_that_opens_by_itself(run, tmp_path):
+    """At h/t = 3 there is nothing to push: said, written, and no failure."""
+    file = tmp_path / "push.json"
+    words = ("landscape", "circle", "--h-over-t", "3", "--edges", "32", "--push", "--json", file)
+    code, out, err = run(*words)
+    assert (code, err) == (0, [])
+    assert "the folded ring is no well" in out
+    assert entries(file.read_text())["pushes"] == []

@@ -125,7 +125,7 @@ def test_an_error_that_more_intervals_do_not_lessen_is_called_rounding(monkeypat
 
     monkeypatch.setattr(Collocation, "error", noisy)
     with pytest.raises(
-        Stuck, match=r"an error of .* on \d+ intervals, as on fewer: it is rounding"
+        Stuck, match=r"rounding leaves an error of .* on \d+ intervals, as on fewer"
     ):
         followed(der.circle(), 4.0, tolerance=1e-8)
 

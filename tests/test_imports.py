@@ -28,7 +28,17 @@ ROOMS = {
         "sections",
         "scene",
     ),
-    "answer": ("files", "shapes", "record", "unfinished", "landscape_record", "states_record"),
+    "answer": (
+        "files",
+        "shapes",
+        "record",
+        "unfinished",
+        "landscape_files",
+        "landscape_record",
+        "landscape_surface_record",
+        "landscape_push_record",
+        "states_record",
+    ),
     "kernels": ("frames", "strain", "dense", "block_ldl", "linking", "assembly"),
     "engine": (
         "rod",
@@ -62,6 +72,10 @@ ROOMS = {
         "landscape_saddles",
         "landscape_free",
         "landscape_over",
+        "landscape_tools",
+        "landscape_march",
+        "landscape_push_search",
+        "landscape_push",
         "states_images",
         "states_deflation",
         "states_starts",
@@ -70,7 +84,7 @@ ROOMS = {
         "states_search",
     ),
     "film": ("curve", "film", "captions", "ribbon", "panel", "projection", "tween"),
-    "layout": ("view_layout", "view_reel", "view_panels", "view_terrain"),
+    "layout": ("view_layout", "view_reel", "view_panels", "view_terrain", "view_style"),
     "views": (
         "summary",
         "view_plots",
@@ -79,6 +93,7 @@ ROOMS = {
         "view_movie",
         "view_html",
         "view_states",
+        "view_push",
     ),
     "roof": ("output", "landscape_words", "states_words", "cli", "__main__"),
 }
@@ -91,7 +106,7 @@ BELOW = {
     "film": ("statement", "answer"),
     "layout": ("statement", "answer", "film"),
     "views": ("statement", "answer", "film", "layout"),
-    "roof": ("statement", "answer", "engine", "views"),
+    "roof": ("statement", "answer", "engine", "layout", "views"),
 }
 ROOM = {module: room for room, modules in ROOMS.items() for module in modules}
 BENCHES = {"bench", "stress"}  # of validation: they time the engine, so they see all of it
@@ -279,7 +294,9 @@ def test_only_commands_import_validation_and_scenarios():
                 "der/view_landscape.py",
                 "der/view_movie.py",
                 "der/view_plots.py",
+                "der/view_push.py",
                 "der/view_states.py",
+                "der/view_style.py",
                 "scenarios/hysteresis_plot.py",
                 "scenarios/states_plot.py",
                 "validation/comparison_plot.py",

@@ -1,5 +1,6 @@
 """Landscapes as records, what they say where something is missing, and their pictures."""
 
+import dataclasses
 import functools
 import json
 import math
@@ -13,14 +14,16 @@ import der
 from der.landscape_curve import landscape
 from der.landscape_free import free_barrier
 from der.landscape_over import barriers_over
+from der.landscape_record import BarrierCurves, Landscape, Pass
 from der.landscape_surface import surface
+from der.landscape_surface_record import Surface
 from der.view_landscape import (
     figure_of_barriers,
     figure_of_landscape,
     figure_of_pass,
     figure_of_surface,
-    save_figure,
 )
+from der.view_style import save_figure
 
 
 def scene(h_over_t=4.0, ring=None, **numerics):
@@ -188,6 +191,109 @@ def test_pictures(tmp_path):
         save_figure(figures["pass"], tmp_path / "pass.txt")
     with pytest.raises(ValueError, match="no well"):
         figure_of_pass(alone(3.0))
+
+
+# --- on disk and back ------------------------------------------------------------------------
+
+
+@functools.cache
+def curves():
+    return barriers_over(der.circle(), [3.0, 8.0], n_edges=32)
+
+
+def records():
+    """One of each kind; with rests that are no wells, cells without a minimum, and NaN."""
+    beyond = surface(
+        scene(4.0),
+        gamma=np.linspace(0.0, math.pi, 4),
+        shape=(4, 5),
+        distance_range=(2.0, math.pi),
+        snaps=False,
+    )
+    return [along(8.0), along(3.0), sheet(), beyond, curves(), alone(), alone(3.0)]
+
+
+def same(one, other):
+    """Whether two records, or parts of them, are equal to the last bit."""
+    assert type(one) is type(other)
+    if isinstance(one, np.ndarray):
+        assert one.shape == other.shape
+        assert one.dtype == other.dtype
+        assert np.ma.getmaskarray(one).tobytes() == np.ma.getmaskarray(other).tobytes()
+        assert np.array_equal(
+            np.ma.getdata(one), np.ma.getdata(other), equal_nan=one.dtype == float
+        )
+    elif dataclasses.is_dataclass(one):
+        for entry in dataclasses.fields(one):
+            if entry.name != "shapes":
+                same(getattr(one, entry.name), getattr(other, entry.name))
+    elif isinstance(one, tuple):
+        assert len(one) == len(other)
+        for a, b in zip(one, other, strict=True):
+            same(a, b)
+    elif isinstance(one, dict):
+        assert list(one) == list(other)
+        for name in one:
+            same(one[name], other[name])
+    else:
+        assert one == other
+
+
+def test_landscapes_come_back_as_they_were(tmp_path):
+    """Every entry bit for bit, but for the shapes of a pass, which are not in the JSON."""
+    for one in records():
+        one.save(tmp_path / "one.json")
+        other = type(one).load(tmp_path / "one.json")
+        same(one, other)
+        assert other.to_json() == one.to_json()
+
+
+@pytest.mark.parametrize(
+    ("one", "old", "new", "message"),
+    [
+        (along, '"schema": 1', '"schema": 2', "schema is 2, this version reads 1"),
+        (along, '"gamma": [', '"gamma": [0.5, ', r"has \d+ entries"),
+        (along, '"rests": [{', '"rests": [{"mood": 1, ', r"rests\[0\].mood is no entry"),
+        (along, '"kind": "well"', '"kind": "saddle"', "kind of a rest must be well"),
+        (along, '"folded": true', '"folded": 1', "folded must be true or false"),
+        (along, '"slope"', '"grade"', r"rests\[0\].slope is missing"),
+        (curves, '"fold": [', '"fold": [1.0, ', "fold has 3 entries, h_over_t has 2"),
+        (curves, '"timing"', '"time"', "timing is missing"),
+        (sheet, '"energy": [[', '"energy": [[1.0, ', r"energy\[0\] must have 8 entries, got 9"),
+        (sheet, '"minima": [[', '"minima": [[[], ', r"minima must have shape \(9, 8\)"),
+        (alone, '"index": 1', '"index": -1', r"saddle.index must be a whole number >= 0, got -1"),
+        (alone, '"ends": ["', '"ends": [3, "', r"ends\[0\] must be a text, got 3"),
+    ],
+)
+def test_a_damaged_file_is_refused(tmp_path, one, old, new, message):
+    """In one line with the file's name and the place of what is wrong."""
+    record, file = one(), tmp_path / "one.json"
+    text = record.to_json()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    with pytest.raises(ValueError, match=message) as refused:
+        type(record).load(file)
+    assert str(refused.value).startswith(f"{file}: ")
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "{}", "null", '{"schema": 1}', "\x00"])
+def test_what_is_no_record_is_refused(text):
+    """Whatever it is: one line."""
+    for kind in (Landscape, BarrierCurves, Pass, Surface):
+        with pytest.raises(ValueError, match=r"not JSON|not a record|schema|missing"):
+            kind.from_json(text)
+
+
+def test_a_torn_file_is_refused(tmp_path):
+    """As a disk that was full leaves it."""
+    text = alone().to_json()
+    (tmp_path / "torn.json").write_text(text[: len(text) // 2])
+    with pytest.raises(ValueError, match="not JSON"):
+        Pass.load(tmp_path / "torn.json")
+    (tmp_path / "torn.json").write_bytes(b"\xff\xfe")
+    with pytest.raises(ValueError, match=r"torn\.json: "):
+        Pass.load(tmp_path / "torn.json")
 
 
 # --- scenarios --------------------------------------------------------------------------------

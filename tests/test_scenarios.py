@@ -137,3 +137,15 @@ def test_three_ways_to_fall():
     np.testing.assert_allclose(falls[0].moment, 0.527103, atol=1e-6)
     np.testing.assert_allclose([overshoot["relax"], overshoot["flow"]], 1.980768, atol=1e-5)
     assert overshoot["move"] == np.pi
+
+
+def test_landscape_push():
+    """A strut that lifts a strand off the other two takes the barrier of twisting, 48 edges.
+
+    The circle's saddle is the same with and without grips; two solves to 1e-10 apart.
+    """
+    from scenarios.landscape_push import lifted, twisting
+
+    assert lifted.last.kind == "pass"
+    np.testing.assert_allclose(lifted.last.work, twisting.open, atol=1e-9)
+    assert lifted.dead.work < 0.7 * twisting.open

@@ -17,7 +17,8 @@ from der.states_images import Images, curvatures, images, repeats
 from der.states_measures import needs_cut, turning
 from der.states_record import RingState, States, Transition
 from der.states_starts import covered, eight
-from der.view_states import figure_of_states, save_figure
+from der.view_states import figure_of_states
+from der.view_style import save_figure
 
 BAR = der.rectangular_section(2.0)
 
@@ -274,11 +275,11 @@ def test_the_record_comes_back_as_it_was(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda e: e.update(schema=2), "schema of states must be 1"),
-        (lambda e: e.pop("gamma"), "must have entries"),
+        (lambda e: e.update(schema=2), "schema is 2, this version reads 1"),
+        (lambda e: e.pop("gamma"), "gamma is missing"),
         (lambda e: e["states"][0].update(energy="low"), r"states\[0\].energy must be a finite"),
         (lambda e: e["states"][0].update(index=-1), r"states\[0\].index must be a whole number"),
-        (lambda e: e["states"][0].pop("name"), r"states\[0\] must have entries"),
+        (lambda e: e["states"][0].pop("name"), r"states\[0\].name is missing"),
         (lambda e: e["states"][1].update(name="flat"), "names of their own"),
         (lambda e: e["transitions"][0].update(end="nowhere"), "between states, got 'nowhere'"),
         (lambda e: e.update(status="lost"), "status must be one of done"),
@@ -293,7 +294,7 @@ def test_a_broken_record_is_refused(change, message):
 
 def test_a_file_that_is_no_record_is_named(tmp_path):
     (tmp_path / "x.json").write_text("{")
-    with pytest.raises(ValueError, match=r"x\.json: states must be JSON"):
+    with pytest.raises(ValueError, match=r"x\.json: not JSON"):
         States.load(tmp_path / "x.json")
 
 

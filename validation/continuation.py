@@ -260,15 +260,13 @@ def _check_refinable(
 ) -> None:
     """Give up where more intervals are of no use: by intervals and errors of first and last try."""
     n, size = last
-    in_vain = n >= IN_VAIN * first[0] and size > REMAINS * first[1]
-    if in_vain or n >= _most(system):
-        why = ", as on fewer: it is rounding," if in_vain else ""
-        raise Stuck(f"an error of {size:.2g} is left on {n} intervals{why} at gamma = {gamma:.6f}")
-
-
-def _most(system: Collocation) -> int:
-    """Intervals that a mesh may have."""
-    return max(MOST_INTERVALS, 4 * len(system.sector.joints))
+    if n >= IN_VAIN * first[0] and size > REMAINS * first[1]:
+        raise Stuck(
+            f"rounding leaves an error of {size:.2g} on {n} intervals, as on fewer,"
+            f" at gamma = {gamma:.6f}"
+        )
+    if n >= _most(system):
+        raise Stuck(f"an error of {size:.2g} is left on {n} intervals at gamma = {gamma:.6f}")
 
 
 def _refined(n: int, size: float, tolerance: float) -> int:

@@ -31,6 +31,8 @@ from scipy.spatial.transform import Rotation
 
 import der
 import der.path
+from der import equilibrium as newton
+from der import relaxation
 from der.assembly import assemble
 from der.checks import Array
 from der.files import FilePath
@@ -41,7 +43,9 @@ from der.scene import CONTACTS_UP_TO, Scene
 from der.sections import Scale, section
 from der.sector import sector
 from der.shapes import Shapes
+from der.snap import TO_AND_FRO
 from der.unfinished import NotConverged
+from validation import collocation
 from validation.random_rings import DENSE, LOOSE
 from validation.solving import solve
 from validation.stress_cases import Case, case_from_json, cases, ring_of, scene_of, section_of
@@ -64,15 +68,32 @@ RETURNED = 1e-6  # a: a ring that has come back
 TIMES = 10.0  # an extrapolated value may be off by so many times its estimated error
 LOOSEST = 1e-9  # tolerance beyond which states of two solves are not compared
 
-# Sentences of NotConverged that the documentation explains, with # for every number.
-EXPLAINED = re.compile(
-    r"no step forward from gamma|the path has (turned back|not ended)|the march has not ended"
-    r"|the flat ring is no |the ring loses stability at gamma|the ring lands at gamma"
-    r"|the (snap|release|ring)?.* came to (rest in no minimum|no rest)|at gamma = # the ring"
-    r"|gamma = # is no equilibrium|the state at gamma = # is no minimum"
-    r"|no (equilibrium|solution) within a step|an error of # is left on|no solution on #"
-)
 _NUMBER = re.compile(r"-?\b\d[\d.]*(e[-+]?\d+)?")
+_REASON = "|".join(  # with # for every number, as everywhere below
+    re.escape(_NUMBER.sub("#", words))
+    for advice in (newton.ADVICE, relaxation.ADVICE, collocation.ADVICE)
+    for words in advice.values()
+)
+# Sentences of NotConverged that the documentation explains, from the first word to the last.
+EXPLAINED = re.compile(
+    rf"no step forward from gamma = #: ((vertex # )?({_REASON})|the path turns too sharply"
+    r"|the path changes its orientation)"
+    r"|the (path|march) has not ended after # steps|the march would not end within # steps"
+    rf"|the flat ring is no (equilibrium|solution): ({_REASON})"
+    r"|the ring loses stability at gamma = # by a mode \([a-z ]+\) that breaks the symmetry of its"
+    r" [a-z]+; the sector 'full' follows it"
+    r"|the ring lands at gamma = # in a state that is unstable to modes \([a-z ]+\) that break the"
+    r" symmetry of its [a-z]+; the sector 'full' follows it"
+    rf"|the snap at gamma = # came to rest in no minimum: (index (#|None)|{TO_AND_FRO}|{_REASON})"
+    rf"|(the snap at gamma = # came to no rest:|at gamma = # the ring) (vertex # )?({_REASON})"
+    rf"|gamma = # is no equilibrium: ({_REASON})"
+    r"|the state at gamma = # is no minimum: it cannot be marched on"
+    rf"|no equilibrium within a step, at gamma = # \(s = # of #\): ({_REASON})"
+    rf"|no solution within a step, at gamma = #: ({_REASON})"
+    r"|an error of # is left on # intervals at gamma = #"
+    r"|rounding leaves an error of # on # intervals, as on fewer, at gamma = #"
+    rf"|no solution on # intervals at gamma = #: ({_REASON})"
+)
 
 
 def stress(
@@ -196,7 +217,7 @@ def _reason(name: str, text: str) -> str:
 def _explained(name: str, text: str) -> bool:
     if name == "ValueError":
         return "[unexpected]" not in text
-    return name == "NotConverged" and EXPLAINED.match(_NUMBER.sub("#", text)) is not None
+    return name == "NotConverged" and EXPLAINED.fullmatch(_NUMBER.sub("#", text)) is not None
 
 
 @contextmanager

@@ -1,0 +1,267 @@
+"""How a folded ring is pushed open, as a picture: rings under their loads, curves and works."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from der.checks import Array
+from der.landscape_push_record import KINDS, LeastPush, Push
+from der.view_style import FREE, INK, STABLE, TITLE, UNSTABLE, blank, dress, seen, title
+
+COLOURS = {"force": STABLE, "couple": UNSTABLE}
+AXES = {
+    "force": ("change of distance  $\\Delta D/a$", "force  $P\\,a^2/GJ$"),
+    "couple": ("turn  $\\theta$  [rad]", "couple  $C\\,a/GJ$"),
+}
+MOST = 7  # bars of each kind
+RINGS = (
+    ("force", "force"),
+    ("couple", "couple"),
+    ("force dead", "force"),
+    ("couple dead", "couple"),
+)
+EVENTS = {
+    "pass": "carried to a pass",
+    "fold": "snaps at a fold",
+    "branch": "snaps at a branch",
+    "limit": "limit of the load",
+    "end": "end",
+}
+ARROW = 0.15  # length of an arrow
+WIDE, HIGH = 1.0, 0.5  # of a little picture, in its own units
+
+
+def figure_of_push(found: LeastPush) -> Figure:
+    """Rings at the moment they open, with their loads; loads over pushes; works of the best.
+
+    Raises
+    ------
+    ValueError
+        If no push opens the ring.
+    """
+    if not found.least:
+        raise ValueError(f"push must open the ring to be plotted: {found.why}")
+    figure = blank((9.2, 6.5))
+    figure.text(0.5, 0.975, title(found.ring, found.section, found.numerics), **TITLE)
+    _rings(figure.add_axes((0.01, 0.655, 0.98, 0.3)), found)
+    kinds = [kind for kind in KINDS if kind in found.least]
+    places = {1: [(0.13, 0.45)], 2: [(0.415, 0.2), (0.105, 0.2)]}[len(kinds)]
+    for kind, (low, high) in zip(kinds, places, strict=True):
+        _curves(figure.add_axes((0.07, low, 0.31, high)), found, kind)
+    _works(figure.add_axes((0.64, 0.155, 0.345, 0.46)), found)
+    handles: list[Any] = [
+        *(Patch(color=COLOURS[kind], alpha=0.75, label=f"slow {kind}") for kind in kinds),
+        Line2D([], [], color=FREE, linewidth=1.5, label="barrier of the ring left alone"),
+        Line2D([], [], label="let go", **_mark("^")),
+        Line2D([], [], label="limit of a dead load", **_mark("v")),
+        Line2D(
+            [], [], marker="|", markersize=9, linestyle="none", color=INK, label="its work so far"
+        ),
+    ]
+    figure.legend(
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 0.003),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=8,
+        handlelength=1.5,
+        columnspacing=1.7,
+        handletextpad=0.5,
+        labelcolor=INK,
+    )
+    return figure
+
+
+# --- Rings -----------------------------------------------------------------------------------
+
+
+def _rings(row: Axes, found: LeastPush) -> None:
+    """Rings as they are let go or get away, in one scale, with arrows where they are pushed."""
+    shown = [(name, kind) for name, kind in RINGS if name in found.shapes]
+    views = [seen(found.shapes[name][0]) for name, _ in shown]
+    if not views:
+        row.set_axis_off()
+        return
+    scale = min(
+        0.6 * WIDE / max(float(np.ptp(view[:, 0])) for view in views),
+        0.86 * HIGH / max(float(np.ptp(view[:, 1])) for view in views),
+    )
+    for i, ((name, kind), view) in enumerate(zip(shown, views, strict=True)):
+        dead = name.endswith("dead")
+        push = found.pushes[(found.least_dead if dead else found.least)[kind]]
+        x, points = found.shapes[name]
+        middle = 0.5 * (view.min(axis=0) + view.max(axis=0))
+        place = np.array([i * WIDE, 0.0, 0.0])
+        _ring(row, scale * (view - middle) + place, COLOURS[kind])
+        loads = _loads(push, points)
+        tips = np.concatenate([points, points + loads])
+        ends = scale * (seen(x, tips) - middle) + place
+        _arrows(row, ends[:2], ends[2:] - ends[:2], double=kind == "couple")
+        row.text(
+            i * WIDE,
+            -0.5 * HIGH,
+            _caption(push, dead=dead),
+            ha="center",
+            va="top",
+            fontsize=7.5,
+            color=INK,
+            linespacing=1.35,
+        )
+    row.set_xlim(-0.5 * WIDE, (len(shown) - 0.5) * WIDE)
+    row.set_ylim(-0.5 * HIGH - 0.24, 0.5 * HIGH + 0.04)
+    row.set_aspect("equal")
+    row.set_axis_off()
+
+
+def _ring(row: Axes, ring: Array, colour: str) -> None:
+    """A closed curve (n, 3), what is nearer on top of what is farther."""
+    for k in np.argsort(ring[:-1, 2]):
+        near = slice(max(int(k) - 1, 0), int(k) + 3)
+        row.plot(*ring[k : k + 2, :2].T, color="white", linewidth=3.4, solid_capstyle="butt")
+        row.plot(*ring[near, :2].T, color=colour, linewidth=1.5, solid_capstyle="round")
+
+
+def _loads(push: Push, points: Array) -> Array:
+    """Directions (2, 3) of unit length: of the forces, or the axes of the couples."""
+    if push.kind == "force":
+        line = points[1] - points[0]
+        line = line / max(float(np.linalg.norm(line)), 1e-300)
+        pull = -line if push.direction == "together" else line
+    else:
+        pull = np.array(push.axis)
+    return np.array([-pull, pull])
+
+
+def _arrows(row: Axes, at: Array, way: Array, *, double: bool) -> None:
+    """Arrows at two points: a force has one head, a couple's axis two."""
+    longest = max(float(np.linalg.norm(way[:, :2], axis=1).max()), 1e-9)
+    for place, along in zip(at[:, :2], way[:, :2], strict=True):
+        row.plot(*place, marker="o", markersize=3.4, color=INK, zorder=6)
+        for share in (1.0, 0.72) if double else (1.0,):
+            row.annotate(
+                "",
+                place + share * ARROW / longest * along,
+                xytext=place,
+                annotation_clip=False,
+                arrowprops={
+                    "arrowstyle": "-|>",
+                    "color": INK,
+                    "linewidth": 1.1,
+                    "shrinkA": 0,
+                    "shrinkB": 0,
+                    "mutation_scale": 8,
+                },
+                zorder=7,
+            )
+
+
+def _caption(push: Push, *, dead: bool) -> str:
+    moment = push.dead if dead and push.dead is not None else push.held
+    first = f"{'dead' if dead else 'slow'} {push.kind}, {push.direction}"
+    return f"{first}\n{_points(push)}\n{EVENTS[moment.event]}, work {moment.work:.4g}"
+
+
+def _points(push: Push) -> str:
+    first, second = push.points
+    return f"s/L = {first:.3g}, {second:.3g}"
+
+
+# --- Curves ----------------------------------------------------------------------------------
+
+
+def _curves(panel: Axes, found: LeastPush, kind: str) -> None:
+    """Load over push: those that open the ring, the best on top."""
+    best = found.least[kind]
+    dead = found.least_dead.get(kind)
+    for k, one in enumerate(found.pushes):
+        if one.kind == kind and one.opens and k not in (best, dead):
+            panel.plot(*_line(one), color="#d5d5d5", linewidth=0.8, zorder=1)
+    panel.margins(x=0.02)
+    push = found.pushes[best]
+    top = 2.2 * max(push.peak, found.pushes[dead].peak if dead is not None else 0.0)
+    if dead is not None and dead != best:
+        panel.plot(
+            *_line(found.pushes[dead]),
+            color=COLOURS[kind],
+            linewidth=1.1,
+            linestyle=(0, (3.5, 1.6)),
+            zorder=3,
+        )
+    panel.plot(*_line(push), color=COLOURS[kind], linewidth=1.8, zorder=4)
+    panel.plot(push.held.push, push.held.load, zorder=6, clip_on=False, **_mark("^"))
+    if dead is not None and (limit := found.pushes[dead].dead) is not None:
+        panel.plot(limit.push, limit.load, zorder=6, **_mark("v"))
+    panel.set_ylim(0.0, top)
+    widest = 1.7 * max(push.held.push, found.pushes[dead].held.push if dead is not None else 0.0)
+    panel.set_xlim(0.0, widest)
+    across, up = AXES[kind]
+    dress(panel, up)
+    panel.set_xlabel(across, fontsize=9, color=INK, labelpad=2)
+    panel.xaxis.set_major_locator(MaxNLocator(6))
+    panel.yaxis.set_major_locator(MaxNLocator(5))
+
+
+def _line(push: Push) -> tuple[Array, Array]:
+    """Load over push, smooth between the minima that were solved for."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    x, load, _ = push.curve.T
+    if len(x) < 3 or np.any(np.diff(x) <= 0.0):
+        return x, load
+    fine = np.linspace(x[0], x[-1], 120)
+    through = PchipInterpolator if push.falls else CubicSpline  # where it falls there is a kink
+    return fine, through(x, load)(fine)
+
+
+def _mark(marker: str) -> dict[str, Any]:
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "markersize": 6.2,
+        "markerfacecolor": "white",
+        "markeredgecolor": INK,
+        "markeredgewidth": 0.9,
+    }
+
+
+# --- Works -----------------------------------------------------------------------------------
+
+
+def _works(panel: Axes, found: LeastPush) -> None:
+    """Works of the best pushes as bars, and what dead loads have done at their limits."""
+    rows: list[Push] = []
+    for kind in KINDS:
+        opening = [one for one in found.pushes if one.kind == kind and one.opens]
+        rows += sorted(opening, key=_rank)[:MOST]
+    place = np.arange(len(rows))[::-1].astype(float)
+    place[: sum(one.kind == "force" for one in rows)] += 0.6
+    for y, one in zip(place, rows, strict=True):
+        panel.barh(y, one.held.work, height=0.66, color=COLOURS[one.kind], alpha=0.75, linewidth=0)
+        if one.dead is not None and one.opens_dead:
+            panel.plot(one.dead.work, y, marker="|", markersize=9, color=INK, zorder=4)
+    panel.set_yticks(place, [f"{_points(one)}  {one.direction}" for one in rows])
+    panel.tick_params(axis="y", length=0)
+    if found.barrier is not None:
+        panel.axvline(found.barrier, color=FREE, linewidth=1.5, zorder=3)
+    widest = max(one.held.work for one in rows)
+    panel.set_xlim(0.0, 1.05 * min(widest, 2.0 * (found.barrier or math.inf)))
+    dress(panel, "")
+    panel.tick_params(axis="y", labelsize=7)
+    panel.spines["left"].set_visible(False)
+    panel.set_xlabel("work until the ring opens  $W\\,a/GJ$", fontsize=9, color=INK, labelpad=2)
+    panel.xaxis.set_major_locator(MaxNLocator(5))
+    panel.grid(axis="x", color="#e8e8e8", linewidth=0.6, zorder=0)
+    panel.set_axisbelow(True)
+
+
+def _rank(one: Push) -> tuple[float, int, float]:
+    return round(one.held.work, 5), one.falls, one.peak

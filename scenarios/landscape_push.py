@@ -1,0 +1,57 @@
+"""Pushing a folded ring open with the least work: circle and ellipse, b/a = 0.6, h/t = 4.
+
+No slow push of a strut or a pair of wrenches takes less than the barrier of the ring left alone. It
+takes just that where it leads to the pass without a snap: a circle by a strut between two strands
+that lie in each other, a third of the ring apart, which lifts one off the other; an ellipse by
+wrenches at the ends of its long axis, which turn against each other across the line between them.
+A dead load gets away earlier, after 0.0037 of 0.0211 GJ/a where a circle is squeezed along a
+diameter of its folded shape; from there on it works by itself.
+
+    python -m scenarios.landscape_push [DIR]
+
+writes push_circle.json, push_ellipse.json and a picture of each to DIR (default:
+out/landscape_push), in two to four minutes; on import, one strut at a third of the circle.
+"""
+
+from __future__ import annotations
+
+import math
+
+import der
+from der.landscape_free import ALIKE, twisted_rests
+from der.landscape_march import march
+from der.landscape_push import least_push
+from der.landscape_tools import struts
+from scenarios.output import folder
+
+N_EDGES = 48
+SECTION = der.rectangular_section(4.0)
+
+rests, alone, twisting, _ = twisted_rests(der.Scene(der.circle(), SECTION, n_edges=N_EDGES))
+lift = struts(alone[-1], (0, N_EDGES // 3))[0]
+lifted = march(lift, rests[-1].energy, ALIKE * rests[-1].energy)
+
+if __name__ == "__main__":
+    from der.view_push import figure_of_push
+    from der.view_style import save_figure
+
+    place = folder("landscape_push")
+    for ring, n_edges in ((der.circle(), 96), (der.ellipse(b_over_a=0.6), 128)):
+        found = least_push(der.Scene(ring, SECTION, n_edges=n_edges, error_bars=True))
+        found.save(place / f"push_{ring.shape}.json")
+        save_figure(figure_of_push(found), place / f"push_{ring.shape}.png")
+        for kind in found.least:
+            value, error = found.extrapolated.get(kind, (math.nan, math.nan))
+            slow, dead = found.pushes[found.least[kind]], found.pushes[found.least_dead[kind]]
+            print(
+                f"{ring.shape}, {kind}: {slow.direction} at {slow.points}, "
+                f"work {slow.held.work:.6f} on the mesh, {value:.6f} +- {error:.0e} without; "
+                f"barrier {found.barrier:.6f}"
+            )
+            if dead.dead is not None:
+                value, error = found.extrapolated.get(f"{kind} dead", (math.nan, math.nan))
+                print(
+                    f"  dead: {dead.direction} at {dead.points}, load {dead.dead.load:.5f}, work "
+                    f"{dead.dead.work:.6f} on the mesh, {value:.6f} +- {error:.0e} without"
+                )
+    print(f"written to {place}")
