@@ -812,16 +812,31 @@ def phase(
 
 @app.command()
 def bench(
-    json: Annotated[str | None, typer.Option(metavar="F", help="Write the rows here.")] = None,
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write what is measured.")] = None,
+    out: Annotated[
+        str | None,
+        typer.Option(metavar="DIR", help="Write bench.json, bench_error.png and bench_cost.png."),
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions and sizes.")] = False,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PARTS",
+            help="Of paths, needs, orders, error, state, scaling, sweep, start; commas between.",
+        ),
+    ] = None,
 ) -> None:
-    """Measure CPU time, memory and error of paths and kernels, on this machine, in one run."""
-    from validation.bench import run
-
+    """Measure time, memory and error of this package and its peers, on this machine, in one run."""
     with _options_named():
         if json is not None:
             check_writable("json", File(json))
-    run(None if json is None else File(json), quick=quick)
+        folder = (
+            None if out is None else targets(None, None, None, out, stem="bench")["json"].parent
+        )
+        from validation.bench import PARTS, run
+
+        parts = PARTS if only is None else tuple(part.strip() for part in only.split(","))
+        run(None if json is None else File(json), out=folder, quick=quick, only=parts)
 
 
 @app.command()

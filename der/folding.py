@@ -13,14 +13,10 @@ import numpy as np
 
 from der.assembly import assemble
 from der.checks import counts, shown
-from der.control import follow_angle, follow_moment
 from der.equilibrium import equilibrium
-from der.error_bars import error_bars
 from der.frames import Array
 from der.path import follow
 from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode
-from der.relaxation import relax
-from der.relaxed_march import follow_relaxed
 from der.ring import circle
 from der.rod import State
 from der.scene import Scene, meshes
@@ -32,7 +28,6 @@ from der.special import EIGHTH, Visit, Wanted, full_index, three_covered
 from der.stability import all_modes, index
 from der.step import Stuck, Tally
 from der.unfinished import Interrupted, NotConverged, interrupts_between_states
-from der.unfolding import shapes
 
 _NO_MOMENT = 1e-6  # of the largest |M|: a state of rest
 _KEPT = 64  # configurations of a snap for N gradients; it takes about 5 N
@@ -127,6 +122,8 @@ def _with_error_bars(
 
     Indices, and the mode but for its slope, are those of the scene's own mesh.
     """
+    from der.error_bars import error_bars
+
     coarse = [_piece(scene, n, piece.name) for n in meshes(scene.n_edges, piece.name)[1:]]
     asked = {math.pi, scene.gamma_max}
     if scene.save_at is not None:
@@ -167,15 +164,24 @@ def _with_error_bars(
 
 
 def _march(scene: Scene, piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
-    """The states of the path, in the way in which the scene is controlled and solved."""
+    """The states of the path, in the way in which the scene is controlled and solved.
+
+    What a scene does not need is not imported either.
+    """
     every = math.ceil(scene.n_edges / _KEPT) if scene.history else 0
     if scene.solver == "relaxation":
+        from der.relaxed_march import follow_relaxed
+
         # no Hessian anywhere: neither index nor link is looked for between states
         bare = replace(wanted, stability=False, contacts=False)
         return follow_relaxed(piece, bare, tally, unload=scene.unload, every=every)
     if scene.control == "angle":
+        from der.control import follow_angle
+
         return follow_angle(piece, wanted, tally, unload=scene.unload, every=every)
     if scene.control == "moment":
+        from der.control import follow_moment
+
         return follow_moment(piece, wanted, tally, unload=scene.unload, every=every)
     return follow(piece, wanted, tally)
 
@@ -185,6 +191,8 @@ def _load_kernels(stability: bool, contacts: bool, *, snaps: bool) -> None:
     """Load or compile the kernels that a path needs, once a process, before the clock starts."""
     piece = sector(circle(), section(1.0, 1.0), 8)
     if snaps:
+        from der.relaxation import relax
+
         relax(piece.body, piece.held, piece.start)
     for _ in follow(piece, Wanted(load_max=0.1, stability=stability, contacts=contacts), Tally()):
         pass
@@ -298,6 +306,8 @@ def _shapes(scene: Scene, piece: Sector, visits: list[Visit], status: str) -> Sh
     """The full ring at every state, if there is any, and what else was asked to be kept of it."""
     if not visits:
         return None
+    from der.unfolding import shapes
+
     modes = scene.modes and status != "interrupted"  # who pressed Ctrl-C does not wait for them
     arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
     return shapes(piece, visits, arc_length, history=scene.history, modes=modes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from der.linking import unfold_lengths
 from der.rod import State
 from der.sector import Sector
 from der.shapes import Fall, Shapes, Softest
-from der.snap import Landing
 from der.special import Visit
 from der.stability import softest_modes
+
+if TYPE_CHECKING:
+    from der.snap import Landing
 
 STEPS = 90  # of a fall at most: three seconds of film
 # how a mode is mapped by the half-turns about E2 and E3, which map the state onto itself
@@ -35,11 +38,7 @@ def shapes(
     """
     states = [visit.at.state for visit in visits]
     x, frames = _whole(piece, states)
-    falls = [
-        _fall(piece, k - 1, visit)
-        for k, visit in enumerate(visits)
-        if history and isinstance(visit, Landing) and visit.history
-    ]
+    falls = _falls(piece, visits) if history else []
     softest = _softest(piece, states) if modes else None
     return Shapes(x, frames, tuple(falls), softest, arc_length)
 
@@ -48,6 +47,17 @@ def _whole(piece: Sector, states: Sequence[State]) -> tuple[Array, Array]:
     """Vertices (n, N, 3) and frames (n, N, 3, 3) of the ring."""
     pairs = [piece.shape(state) for state in states]
     return np.array([x for x, _ in pairs]), np.array([frames for _, frames in pairs])
+
+
+def _falls(piece: Sector, visits: Sequence[Visit]) -> list[Fall]:
+    """How the ring falls in the snaps among the visits."""
+    from der.snap import Landing
+
+    return [
+        _fall(piece, k - 1, visit)
+        for k, visit in enumerate(visits)
+        if isinstance(visit, Landing) and visit.history
+    ]
 
 
 def _fall(piece: Sector, after: int, landing: Landing) -> Fall:

@@ -205,6 +205,7 @@ WRONG = [
     (("bend",), "'bend'", "No such command", ""),
     (("flod",), "'flod'", "No such command", "'fold'"),
     (("bench", "--json", "no/such/f.json"), "--json", "'no/such/f.json'", "folder"),
+    (("bench", "--only", "speed"), "--only", "'speed'", "paths, needs"),
 ]
 
 

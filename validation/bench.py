@@ -1,324 +1,266 @@
 """Run time against error, on this machine, in one run: `der bench`.
 
-Every number is measured here and now: CPU time of this process (``time.process_time``), medians of
-several runs, warm unless a row says otherwise, so that ratios between rows mean something on a
-noisy machine. Errors are normal distances to reference curves that another program computed
-(AUTO-07p, orthogonal collocation; see validation/reference), as in `validation.curves`.
+Every number is measured here and now: CPU time of this process, wall time, and the most memory held
+at once, medians of several runs, warm unless a row says otherwise, so that ratios between rows mean
+something on a noisy machine. Errors are normal distances, in (gamma/pi, M/max|M|) and in
+(gamma/pi, U/max U), from the converged solution of the boundary-value problem (`bench_rings`).
+What others measured elsewhere stands in a table of its own, with its source.
 """
 
 from __future__ import annotations
 
 import json
-import platform
-import statistics
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cache
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 
-import numpy as np
+from der.checks import shown
+from der.files import write_whole
+from validation import (
+    bench_elastica,
+    bench_needs,
+    bench_orders,
+    bench_paths,
+    bench_rings,
+    bench_state,
+    bench_sweep,
+)
+from validation.bench_cited import CITED, cited
+from validation.bench_methods import (
+    SIZES,
+    TOLERANCES,
+    bvp_trials,
+    relaxation_trials,
+    rod_trials,
+    stepping_trials,
+)
+from validation.bench_rows import Row, Trial, machine
+from validation.bench_scaling import SIZES as SCALES
+from validation.bench_scaling import Scale, scale
 
-import der
-from der.assembly import assemble, take_out
-from der.block_ldl import factor
-from der.control import follow_angle
-from der.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
-from der.relaxed_march import follow_relaxed
-from der.rod import State
-from der.scene import MEASURES
-from der.sector import Sector, sector
-from der.snap import Landing, snap
-from der.special import Visit, Wanted
-from der.step import Tally
-from validation.bench_bvp import rows as bvp_rows
-from validation.curves import ReferenceCurve, curve_error, fold_error, read_reference
-
-REFERENCE = Path(__file__).parent / "reference"
-Follower = Callable[[Sector, Wanted, Tally], Iterator[Visit]]
-CASES = {4.0: "circ_ht4", 1.6: "circ_ht1.6", 1.0: "circ_ht1_beyond_pi"}
+PARTS = ("paths", "needs", "orders", "error", "state", "scaling", "sweep", "start")
 
 
 @dataclass(frozen=True)
-class Row:
-    """One measured quantity."""
+class Extent:
+    """How much is measured."""
 
-    group: str
-    case: str
-    value: float
-    unit: str
-    goal: float | None = None
-    note: str = ""
-
-
-def run(file: Path | None = None, *, quick: bool = False) -> list[Row]:
-    """Measure everything, print a table as it grows, and write JSON if ``file`` is given."""
-    print(f"der {version('ring-origami')}, {machine()}")
-    rows: list[Row] = []
-    try:
-        for row in measure(quick=quick):
-            rows.append(row)
-            print(_line(row), flush=True)
-    finally:  # Ctrl-C keeps the rows it has
-        if file is not None:
-            record = {"machine": machine(), "rows": [asdict(row) for row in rows]}
-            file.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
-    return rows
+    repeats: int = 5
+    rings: tuple[bench_rings.BenchRing, ...] = bench_rings.RINGS
+    states: int = bench_rings.STATES  # of the reference
+    edges: tuple[int, ...] = SIZES
+    tolerances: tuple[float, ...] = TOLERANCES
+    relaxed: tuple[int, ...] = (32, 64, 128)
+    stepping: tuple[float, ...] = (1e-3, 1e-5, 1e-6)
+    slow_repeats: int = 3  # of what takes seconds
+    elements: tuple[int, ...] = (16, 32, 64, 128, 256)  # of PyElastica
+    orders: tuple[int, ...] = bench_orders.SIZES
+    scales: tuple[int, ...] = SCALES
+    swept: int = 1000
+    sample: int = 40
+    commands: int = 5
 
 
-def _line(row: Row) -> str:
-    goal = "" if row.goal is None else f"goal {row.goal:g}"
-    value = f"{row.value:11.4g} {row.unit:7}"
-    return f"{row.group:12}{row.case:52}{value} {goal:11} {row.note}".rstrip()
+FULL = Extent()
+QUICK = Extent(
+    repeats=3,
+    rings=tuple(case for case in bench_rings.RINGS if case.name != "rectangle 0.6, r/a 0.3"),
+    edges=(32, 128),
+    tolerances=(1e-4, 1e-7, 1e-10),
+    relaxed=(32,),
+    stepping=(1e-3,),
+    slow_repeats=1,
+    elements=(16, 32),
+    orders=(64, 128, 256),
+    scales=(64, 1024, 16384),
+    swept=50,
+    sample=4,
+    commands=2,
+)
 
 
-def machine() -> str:
-    """Processor, Python and the libraries that matter for speed."""
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba"))
-    return f"{_processor()}, Python {platform.python_version()}, {libraries}"
+@dataclass
+class Found:
+    """All that was measured."""
+
+    rows: list[Row] = field(default_factory=list)
+    trials: list[Trial] = field(default_factory=list)
+    scales: list[Scale] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)
+
+    def to_json(self) -> str:
+        """JSON text, with the machine, and what is cited set apart."""
+        entries = {
+            "machine": machine(),
+            "version": version("ring-origami"),
+            "rows": [asdict(row) for row in self.rows],
+            "trials": [asdict(trial) for trial in self.trials],
+            "scales": [asdict(scale) for scale in self.scales],
+            "skipped": self.skipped,
+            "cited": CITED,
+        }
+        return json.dumps(entries, indent=1, allow_nan=False) + "\n"
 
 
-def _processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    except OSError:  # not Linux
-        pass
-    return platform.processor() or platform.machine()
+def run(
+    file: Path | None = None,
+    *,
+    out: Path | None = None,
+    quick: bool = False,
+    only: tuple[str, ...] = PARTS,
+) -> Found:
+    """Measure, print tables as they grow, and write what is asked for.
 
+    Parameters
+    ----------
+    file : where the JSON goes.
+    out : folder for bench.json, bench_error.png and bench_cost.png.
+    quick : whether to take fewer sizes and repetitions.
+    only : which of `PARTS`.
 
-def measure(*, quick: bool = False) -> Iterator[Row]:
-    """All rows, one after the other."""
-    repeats = 5 if quick else 15
-    yield from _paths(repeats)
-    yield from _needs(repeats)
-    yield from _relaxation((32, 64, 128) if quick else (32, 64, 128, 256))
-    yield from _snaps(repeats)
-    yield from _recording(repeats)
-    yield from _errors((32, 64, 128) if quick else (32, 64, 128, 256, 512))
-    yield from _newton((64, 1024) if quick else (64, 256, 1024, 4096, 16384, 65536))
-    yield from (Row(*row) for row in bvp_rows(cpu_time, 3 if quick else repeats))
-    yield from _start_up(2 if quick else 5)
-
-
-def cpu_time(work: Callable[[], object], repeats: int) -> float:
-    """Median CPU time of ``work`` [s], after one run that is not counted."""
-    work()
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        times.append(time.process_time() - start)
-    return statistics.median(times)
-
-
-def _circle(h_over_t: float, **wants: object) -> der.Scene:
-    return der.Scene(der.circle(), der.rectangular_section(h_over_t), **wants)  # type: ignore[arg-type]
-
-
-def _paths(repeats: int) -> Iterator[Row]:
-    """The two paths that the project sets itself goals for."""
-    cases = [
-        ("h/t 4, N 64, quarter, no stability", _circle(4.0, stability=False), 15.0),
-        ("h/t 4, N 64, full ring, index at every state", _circle(4.0, sector="full"), 60.0),
-        ("h/t 4, N 64, quarter, index at every state", _circle(4.0), None),
-        ("h/t 1.6, N 64, quarter, index, two folds", _circle(1.6), None),
-        ("h/t 1, N 64, until folded, index", _circle(1.0, until="folded"), None),
-        (
-            "h/t 4, N 128, quarter, error bars",
-            _circle(4.0, n_edges=128, stability=False, error_bars=True),
-            60.0,
-        ),
-        (
-            "h/t 1.6, N 64, quarter, angle up and down, 2 snaps",
-            _circle(1.6, control="angle", unload=True),
-            None,
-        ),
-        (
-            "h/t 4, N 64, quarter, by relaxation alone",
-            _circle(4.0, control="angle", solver="relaxation"),
-            None,
-        ),
-    ]
-    for case, scene, goal in cases:
-        path = der.fold(scene)
-        note = f"{path.timing.steps} steps, {path.timing.newton_iterations} Newton iterations"
-        seconds = cpu_time(lambda scene=scene: der.fold(scene), repeats)  # type: ignore[misc]
-        yield Row("path", case, 1e3 * seconds, "ms", goal, note)
-
-
-def _needs(repeats: int) -> Iterator[Row]:
-    """What each need of a scene costs, over the same path without it."""
-    bare = {"stability": False, "contacts": False}
-    base = cpu_time(lambda: der.fold(_circle(4.0, **bare)), repeats)
-    yield Row("need", "none: h/t 4, N 64, quarter", 1e3 * base, "ms")
-    cases: dict[str, dict[str, object]] = {
-        "stability": {"stability": True},
-        "contacts": {"contacts": True},
-        "shapes": {"shapes": True},
-        "shapes with softest modes": {"shapes": True, "modes": True},
-        "full ring": {"sector": "full"},
-        "half ring": {"sector": "half"},
-        "finite stretch": {"stretch": "finite"},
-    }
-    for name, wants in cases.items():
-        scene = _circle(4.0, **{**bare, **wants})
-        seconds = cpu_time(lambda scene=scene: der.fold(scene), repeats)  # type: ignore[misc]
-        yield Row("need", name, seconds / base, "times")
-
-
-def _relaxation(sizes: tuple[int, ...]) -> Iterator[Row]:
-    """The march of the angle by dynamic relaxation alone against the same by Newton, over N."""
-    wanted = Wanted(stability=False, contacts=False)
-    for n in sizes:
-        piece = sector(der.circle(), der.rectangular_section(4.0), n)
-
-        def march(follow: Follower, tally: Tally, piece: Sector = piece) -> int:
-            return len(list(follow(piece, wanted, tally)))
-
-        newton, relaxed = Tally(), Tally()
-        states = march(follow_relaxed, relaxed), march(follow_angle, newton)
-        times = [
-            cpu_time(lambda follow=follow, march=march: march(follow, Tally()), 5)  # type: ignore[misc]
-            for follow in (follow_relaxed, follow_angle)
-        ]
-        per_state = [1e3 * t / k for t, k in zip(times, states, strict=True)]
-        case = f"h/t 4, N {n}, quarter"
-        note = f"{relaxed.force_evaluations} force evaluations, {1e3 * times[0]:.0f} ms"
-        yield Row("relaxation", f"{case}, a state", per_state[0], "ms", None, note)
-        note = f"{newton.newton_iterations} Newton iterations, {1e3 * times[1]:.0f} ms"
-        yield Row("relaxation", f"{case}, a state by Newton", per_state[1], "ms", None, note)
-
-
-def _snaps(repeats: int) -> Iterator[Row]:
-    """One snap: dynamic relaxation past the fold, and the polish by Newton."""
-    wanted = Wanted(stability=False, contacts=False)
-    for name in ("quarter", "full"):
-        piece = sector(der.circle(), der.rectangular_section(1.6), 64, name=name)
-        before = next(v.at for v in follow_angle(piece, wanted, Tally()) if v.kind == "fold")
-
-        def fall(piece: Sector = piece, before: Equilibrium = before) -> Landing:
-            return snap(piece, wanted, Tally(), before, before.tangent)
-
-        seconds = cpu_time(fall, repeats)
-        note = f"{fall().details['force_evaluations']} force evaluations"
-        yield Row("snap", f"h/t 1.6, N 64, {name}", 1e3 * seconds, "ms", 100.0, note)
-
-
-def _recording(repeats: int) -> Iterator[Row]:
-    """A recording for playback: 400 equilibria of 128 edges, scaled from what the path has."""
-    from der.view_rerun import recording_bytes
-
-    gammas = tuple(np.linspace(0.0, np.pi, 361)[1:])
-    scene = _circle(1.6, n_edges=128, shapes=True, stability=False, save_at=gammas)
-    path = der.fold(scene)
-    share = 400.0 / len(path)
-    size = len(recording_bytes(path)) * share
-    seconds = cpu_time(lambda: recording_bytes(path), min(repeats, 5)) * share
-    case = "400 steps, 128 edges"
-    yield Row("recording", f"{case}, file", 1e-6 * size, "MB", 10.0)
-    yield Row("recording", f"{case}, made", seconds, "s", 1.0)
-
-
-def _errors(sizes: tuple[int, ...]) -> Iterator[Row]:
-    """Curve error over N for each reference curve and measure, the fitted order, and the folds."""
-    for h_over_t, name in CASES.items():
-        reference = read_reference(REFERENCE / f"{name}.csv")
-        until = "folded" if "beyond" in name else None
-        for measure_name in MEASURES:
-            if measure_name != MEASURES[0] and h_over_t != 4.0:
-                continue
-            errors = []
-            for n in sizes:
-                path = der.fold(
-                    _circle(
-                        h_over_t,
-                        n_edges=n,
-                        curvature=measure_name,
-                        stability=False,
-                        contacts=False,
-                        until=until,
-                    )
-                )
-                errors.append(max(curve_error(path.gamma, path.moment, path.energy, reference)))
-                note = f"in {1e3 * path.timing.solve_s:.1f} ms"
-                if reference.folds:
-                    gammas = [point.gamma for point in path.folds]
-                    note += f", folds off by {fold_error(gammas, reference):.2g} rad"
-                case = f"h/t {h_over_t:g}, {measure_name}, N {n}"
-                goal = {4.0: 1e-2, 1.6: 2.5e-2}.get(h_over_t) if n == 64 else None
-                goal = goal if measure_name == MEASURES[0] else None
-                yield Row("curve error", case, errors[-1], "", goal, note)
-            if measure_name == MEASURES[0]:
-                yield from _extrapolated(h_over_t, until, reference)
-            order = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
-            case = f"h/t {h_over_t:g}, {measure_name}, N {sizes[0]} ... {sizes[-1]}"
-            yield Row("order", case, float(order), "", 2.0)
-
-
-def _extrapolated(h_over_t: float, until: str | None, reference: ReferenceCurve) -> Iterator[Row]:
-    """Curve error of the extrapolated path."""
-    scene = _circle(
-        h_over_t, n_edges=128, stability=False, contacts=False, until=until, error_bars=True
-    )
-    path = der.fold(scene)
-    error = max(curve_error(path.gamma, path.moment, path.energy, reference))
-    note = f"in {1e3 * path.timing.solve_s:.1f} ms"
-    if reference.folds:
-        gammas = [point.gamma for point in path.folds]
-        note += f", folds off by {fold_error(gammas, reference):.2g} rad"
-    goal = 2e-5 if h_over_t == 4.0 else 3e-4
-    yield Row("curve error", f"h/t {h_over_t:g}, error bars, N 128", error, "", goal, note)
-
-
-def _newton(sizes: tuple[int, ...]) -> Iterator[Row]:
-    """One Newton iteration of the full ring, assembly, factorisation and solve, over N.
-
-    Timed as whole solves at a given gamma; the last pass of a solve, for tangent and index, costs
-    an iteration, and so does its share of the call.
+    Raises
+    ------
+    ValueError
+        For a part that there is not.
     """
-    for n in sizes:
-        ring = sector(der.circle(), der.rectangular_section(4.0), n, name="full")
-        flat = equilibrium(ring.body, ring.held, ring.start)
-        rate = flat.tangent
-        start = moved(ring.held, flat.state, Direction(0.1 * rate.q, 0.1 * rate.force, 0.1))
-
-        def solve(ring: Sector = ring, start: State = start) -> Equilibrium:
-            return equilibrium(ring.body, ring.held, start, control=Control.LOAD)
-
-        solved = solve()
-        many = max(1, 2048 // n)
-        seconds = cpu_time(lambda solve=solve, many=many: [solve() for _ in range(many)], 7)  # type: ignore[misc]
-        seconds /= many * (solved.iterations + 1)
-        goal = 0.15 if n == 64 else None
-        note = f"{1e6 * seconds / n:.2f} us an edge, residual {solved.residual:.1e}"
-        yield Row("newton", f"full ring, N {n}", 1e3 * seconds, "ms", goal, note)
-        yield Row("memory", f"full ring, N {n}", _bytes(ring) / n, "B/edge", 4096.0)
-
-
-def _bytes(ring: Sector) -> int:
-    """Bytes that one iteration holds at once: state, derivatives and factors."""
-    state, held = ring.start, ring.held
-    system = assemble(ring.body, held, state.quat, state.stretch, state.force, state.load)
-    blocks = take_out(held.free, system.diag, system.off, system.border)
-    factors = factor(*blocks)
-    arrays = [*state.__dict__.values(), *held, *ring.body, *system, *blocks, *factors]
-    total = sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
-    return total
+    wrong = [part for part in only if part not in PARTS]
+    if wrong or not only:
+        raise ValueError(f"only must be some of {', '.join(PARTS)}, got {shown(', '.join(wrong))}")
+    print(f"der {version('ring-origami')}, {machine()}")
+    found = Found()
+    try:
+        for one in measure(QUICK if quick else FULL, only):
+            kept(found, one)
+            print(one, flush=True)
+    finally:  # Ctrl-C keeps what there is
+        for target in [file, *([] if out is None else [out / "bench.json"])]:
+            if target is not None:
+                content = found.to_json().encode()
+                write_whole(target, lambda opened, content=content: opened.write(content))  # type: ignore[misc]
+        if out is not None:
+            _draw(found, out)
+    print(cited())
+    return found
 
 
-def _start_up(repeats: int) -> Iterator[Row]:
-    """Wall time of whole commands, compiled before."""
-    for words, goal in (
-        (["--help"], 0.5),
-        (["fold", "circle", "--h-over-t", "4", "--quiet"], 3.0),
-    ):
-        times = []
-        for _ in range(repeats):
+def kept(found: Found, one: Row | Trial | Scale | str) -> None:
+    """Put one thing measured where it belongs."""
+    if isinstance(one, Row):
+        found.rows.append(one)
+    elif isinstance(one, Trial):
+        found.trials.append(one)
+    elif isinstance(one, Scale):
+        found.scales.append(one)
+    elif one.endswith("skipped"):
+        found.skipped.append(one)
+
+
+def measure(
+    extent: Extent = FULL, only: tuple[str, ...] = PARTS
+) -> Iterator[Row | Trial | Scale | str]:
+    """All that is measured, one thing after the other; words are for the reader alone."""
+    parts: Mapping[str, Callable[[Extent], Iterator[Row | Trial | Scale | str]]] = {
+        "paths": _paths,
+        "needs": lambda e: bench_needs.rows(e.repeats),
+        "orders": _orders,
+        "error": _errors,
+        "state": _state,
+        "scaling": _scaling,
+        "sweep": lambda e: bench_sweep.rows(e.swept, e.sample),
+        "start": lambda e: bench_paths.start_up(e.commands),
+    }
+    for part in PARTS:
+        if part in only:
+            yield f"\n{part}"
             start = time.perf_counter()
-            subprocess.run([sys.executable, "-m", "der", *words], check=True, capture_output=True)
-            times.append(time.perf_counter() - start)
-        yield Row("start-up", "der " + " ".join(words), statistics.median(times), "s", goal)
+            yield from parts[part](extent)
+            yield f"{part} took {time.perf_counter() - start:.0f} s"
+
+
+def _paths(extent: Extent) -> Iterator[Row]:
+    repeats = extent.repeats
+    yield from bench_paths.paths(repeats)
+    yield from bench_paths.bvp_paths(repeats, extent.rings)
+    yield from bench_paths.relaxation(extent.relaxed, min(repeats, 5))
+    yield from bench_paths.snaps(repeats)
+    yield from bench_paths.recording(min(repeats, 5))
+
+
+def _orders(extent: Extent) -> Iterator[Row]:
+    """How well the truth is known, and how errors fall towards it."""
+    for case in extent.rings:
+        truth = _known(case, extent.states)
+        yield from bench_rings.rows(truth)
+        yield from bench_orders.rows(truth, extent.orders)
+
+
+def _errors(extent: Extent) -> Iterator[Row | Trial | str]:
+    """Errors over time of each ring's whole path."""
+    for case in extent.rings:
+        truth = _known(case, extent.states)
+        trials = []
+        for trial in chain(
+            rod_trials(truth, extent.edges, extent.repeats),
+            relaxation_trials(truth, extent.relaxed, extent.slow_repeats),
+            bvp_trials(truth, extent.tolerances, extent.repeats),
+            stepping_trials(truth, extent.stepping, extent.slow_repeats),
+        ):
+            trials.append(trial)
+            yield trial
+        if case.folds:
+            yield f"{case.name}: solve_bvp cannot step past a fold, skipped"
+        yield from _front(case.name, trials)
+
+
+_known = cache(bench_rings.known)  # by two parts
+
+
+def _state(extent: Extent) -> Iterator[Trial | str]:
+    """One state, by everyone."""
+    edges, relaxed = extent.edges, extent.relaxed
+    sizes = {
+        "rod, sector": edges,
+        "rod, full ring": edges,
+        "rod, extrapolated": tuple(n for n in edges if n >= 32),
+        "dynamic relaxation": relaxed,
+    }
+    trials = []
+    for trial in bench_state.trials(
+        sizes, extent.tolerances, extent.stepping, extent.elements, extent.repeats
+    ):
+        trials.append(trial)
+        yield trial
+    if not bench_elastica.installed():
+        yield "PyElastica: not installed, skipped"
+    yield from _front(bench_state.NAME, trials)
+
+
+def _front(name: str, trials: list[Trial]) -> Iterator[str]:
+    """The methods that none beats, in words."""
+    from validation.bench_plot import front
+
+    best = "; ".join(
+        f"{1e3 * t.cpu:.1f} ms {t.error:.1e} {t.method} {t.setting}" for t in front(trials)
+    )
+    yield f"{name}: none is faster and better than {best}"
+
+
+def _scaling(extent: Extent) -> Iterator[Scale | Row]:
+    for n in extent.scales:
+        measured = scale(n, min(extent.repeats, 5))
+        yield measured
+        yield from measured.rows()
+
+
+def _draw(found: Found, out: Path) -> None:
+    """The pictures of what there is."""
+    from validation.bench_plot import draw_costs, draw_errors
+
+    if any(trial.error is not None for trial in found.trials):
+        print(f"wrote {draw_errors(found.trials, out / 'bench_error.png')}")
+    if found.scales:
+        print(f"wrote {draw_costs(found.scales, out / 'bench_cost.png')}")

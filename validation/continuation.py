@@ -269,6 +269,11 @@ def _check_refinable(
         raise Stuck(f"an error of {size:.2g} is left on {n} intervals at gamma = {gamma:.6f}")
 
 
+def _most(system: Collocation) -> int:
+    """Intervals that a mesh may have."""
+    return max(MOST_INTERVALS, 4 * len(system.sector.joints))
+
+
 def _refined(n: int, size: float, tolerance: float) -> int:
     """Intervals that bring an error of order h^8 to the one aimed at."""
     if not math.isfinite(size):

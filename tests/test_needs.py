@@ -1,0 +1,152 @@
+"""What a scene does not ask for is neither computed, nor allocated, nor imported."""
+
+import json
+import subprocess
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import der
+from der.assembly import assemble
+from der.relaxation import relax
+from der.sector import sector
+from validation.bench_rows import peak_memory
+
+BARE = {"n_edges": 32, "stability": False, "contacts": False, "gamma_max": 0.6}
+
+# what may be asked for -> who does it, in the module that calls it
+DOERS = {
+    "stability": ({"stability": True}, "der.special.index_and_stiffness"),
+    "contacts": ({"contacts": True}, "der.sector.link"),
+    "error bars": ({"error_bars": True}, "der.error_bars.error_bars"),
+    "shapes": ({"shapes": True}, "der.unfolding.shapes"),
+    "modes": ({"shapes": True, "modes": True}, "der.unfolding.softest_modes"),
+    "relaxation": ({"control": "angle", "solver": "relaxation"}, "der.relaxation._relax"),
+}
+
+
+class Done(Exception):
+    """The thing was done."""
+
+
+def scene(**wants):
+    return der.Scene(der.circle(), der.rectangular_section(4.0), **{**BARE, **wants})
+
+
+@pytest.mark.parametrize("need", DOERS)
+def test_what_is_not_asked_for_is_not_computed(need, monkeypatch):
+    """Whoever computes it is not called without, and is called with it."""
+    wants, doer = DOERS[need]
+    der.fold(scene())  # kernels load before, and check stability and contacts never by the way
+
+    def done(*_, **__):
+        raise Done
+
+    monkeypatch.setattr(doer, done)
+    der.fold(scene())
+    with pytest.raises(Done):
+        der.fold(scene(**wants))
+
+
+def test_what_is_not_asked_for_is_not_in_the_record():
+    """No index, error, raw values or shapes; with frames alone, no modes and no falls."""
+    path = der.fold(scene())
+    assert path.error is None
+    assert path.raw is None
+    assert path.shapes is None
+    assert np.ma.getmaskarray(path.index).all()
+    kept = der.fold(scene(shapes=True)).shapes
+    assert kept.softest is None
+    assert kept.falls == ()
+
+
+def test_history_of_snaps_is_kept_only_where_it_is_asked_for():
+    """A ring that snaps (h/t = 1.6) has falls with history, and none without."""
+    wants = {"n_edges": 16, "stability": False, "contacts": False, "control": "angle"}
+    section = der.rectangular_section(1.6)
+    falls = [
+        der.fold(der.Scene(der.circle(), section, shapes=True, history=asked, **wants)).shapes.falls
+        for asked in (False, True)
+    ]
+    assert falls[0] == ()
+    assert len(falls[1]) > 0
+
+
+def kept_bytes(work):
+    """Memory that the result of ``work`` holds on to."""
+    work()  # what is loaded by the way is no memory of the result
+    tracemalloc.start()
+    try:
+        result = work()
+        return tracemalloc.get_traced_memory()[0], result
+    finally:
+        tracemalloc.stop()
+
+
+def test_frames_are_kept_only_where_they_are_asked_for():
+    """A record without frames holds less than one with them, by 12 numbers an edge and state."""
+    lean, path = kept_bytes(lambda: der.fold(scene(n_edges=64)))
+    full, _ = kept_bytes(lambda: der.fold(scene(n_edges=64, shapes=True)))
+    frames = len(path) * 64 * 12 * 8
+    assert full - lean == pytest.approx(frames, rel=0.1)
+    assert lean < frames
+
+
+def test_history_is_allocated_only_where_it_is_asked_for():
+    """A relaxation reserves room for its configurations, or none."""
+    piece = sector(der.circle(), der.rectangular_section(4.0), 16)
+
+    def rest(every):
+        relax(piece.body, piece.held, piece.start, every=every, most=20_000)
+
+    rest(0)
+    assert peak_memory(lambda: rest(0)) < 0.1 * peak_memory(lambda: rest(1))
+
+
+@pytest.mark.parametrize(("stretching", "block"), [(0.0, 3), (1e4, 4)])
+def test_stretch_takes_unknowns_only_where_it_is_finite(stretching, block):
+    """Three unknowns an edge, and four where the edges stretch: blocks of that size."""
+    piece = sector(der.circle(), der.rectangular_section(4.0), 16, stretching=stretching)
+    state = piece.start
+    system = assemble(piece.body, piece.held, state.quat, state.stretch, state.force, state.load)
+    assert system.diag.shape[1:] == (block, block)
+    assert len(system.diag) < 8  # of a quarter, not of the ring
+
+
+OPTIONAL = (
+    "der.error_bars",
+    "der.matching",
+    "der.control",
+    "der.snap",
+    "der.relaxation",
+    "der.relaxed_march",
+    "der.unfolding",
+    "der.view_rerun",
+    "der.view_plots",
+    "validation",
+    "matplotlib",
+    "rerun",
+    "rich",
+    "shapely",
+    "distributed",
+)
+NEEDED = {
+    "": set(),
+    "error_bars=True, shapes=True": {"der.error_bars", "der.matching", "der.unfolding"},
+    "control='angle'": {"der.control", "der.snap", "der.relaxation"},
+}
+
+
+@pytest.mark.parametrize("wants", NEEDED)
+def test_what_is_not_asked_for_is_not_imported(wants):
+    """A fresh Python folds a ring and has loaded what the scene needs, and nothing else of it."""
+    code = (
+        "import json, sys, der\n"
+        "scene = der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=32,"
+        f" stability=False, contacts=False, gamma_max=0.1, {wants})\n"
+        f"der.fold(scene)\nprint(json.dumps([n for n in {OPTIONAL!r} if n in sys.modules]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(json.loads(done.stdout)) == NEEDED[wants]

@@ -1,0 +1,108 @@
+"""What each need of a scene costs, over the same path without it: CPU time and memory.
+
+A need is what may be asked for or left out. Twist cannot be left out: a frame turns about three
+axes, and the kernels know no rod that does not. Neither can anisotropy; its rows say that a section
+with two stiffnesses costs what one with a single stiffness does. Memory is what is asked of the
+system: a history reserves room for the longest snap there can be, most of it never touched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+import der
+from der.sections import section
+from validation.bench_paths import circle
+from validation.bench_rows import Row, measured
+
+BARE: Mapping[str, object] = {"stability": False, "contacts": False}
+KEPT: Mapping[str, object] = {"shapes": True}
+TURNED: Mapping[str, object] = {"control": "angle", "unload": True}
+
+# name -> (h/t, what is wanted besides, what it is compared with)
+NEEDS: Mapping[str, tuple[float, Mapping[str, object], Mapping[str, object]]] = {
+    "stability of every state": (4.0, {"stability": True}, {}),
+    "self-crossings": (4.0, {"contacts": True}, {}),
+    "error bars": (4.0, {"error_bars": True}, {}),
+    "full ring": (4.0, {"sector": "full"}, {}),
+    "half ring": (4.0, {"sector": "half"}, {}),
+    "full ring and stability": (4.0, {"sector": "full", "stability": True}, {}),
+    "finite stretch": (4.0, {"stretch": "finite"}, {}),
+    "turning angle for the logarithm": (4.0, {"curvature": "angle"}, {}),
+    "tangent for the logarithm": (4.0, {"curvature": "tangent"}, {}),
+    "frames of every state kept": (4.0, KEPT, {}),
+    "softest modes, over frames": (4.0, {**KEPT, "modes": True}, KEPT),
+    "angle up and down, two snaps": (1.6, TURNED, {}),
+    "history of the snaps, over frames": (
+        1.6,
+        {**TURNED, **KEPT, "history": True},
+        {**TURNED, **KEPT},
+    ),
+}
+
+
+def rows(repeats: int, n_edges: int = 64) -> Iterator[Row]:
+    """One row for the bare path, and two for each need: times the CPU time, and memory added."""
+    bare: dict[tuple[float, str], tuple[float, int]] = {}
+
+    def base(h_over_t: float, wants: Mapping[str, object]) -> tuple[float, int]:
+        key = (h_over_t, repr(wants))
+        if key not in bare:
+            bare[key] = _cost(_folding(h_over_t, wants, n_edges), repeats)
+        return bare[key]
+
+    seconds, memory = base(4.0, {})
+    note = f"{1e-3 * memory:.0f} kB"
+    yield Row("need", f"none: h/t 4, N {n_edges}, quarter", 1e3 * seconds, "ms", None, note)
+    for name, (h_over_t, wants, without) in NEEDS.items():
+        before, held = base(h_over_t, without)
+        taken, peak = _cost(_folding(h_over_t, wants, n_edges), repeats)
+        yield Row("need", name, taken / before, "times", None, _added(taken - before, peak - held))
+    yield from _outputs(repeats, seconds, n_edges)
+    yield from _always(repeats, seconds, n_edges)
+
+
+def _outputs(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
+    """What showing and storing a path costs, over folding it: files are left out, disks differ."""
+    from der.view_plots import figure_of_path
+    from der.view_rerun import recording_bytes
+
+    path = der.fold(circle(4.0, n_edges=n_edges, **BARE))
+    shaped = der.fold(circle(4.0, n_edges=n_edges, **BARE, **KEPT))
+    works: Mapping[str, Callable[[], object]] = {
+        "record as JSON": path.to_json,
+        "recording for playback": lambda: recording_bytes(shaped),
+        "plot": lambda: figure_of_path(path).canvas.draw(),
+    }
+    for name, work in works.items():
+        taken, peak = _cost(work, min(repeats, 5))
+        yield Row("need", name, 1.0 + taken / seconds, "times", None, _added(taken, peak))
+
+
+def _always(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
+    """Anisotropy, per Newton iteration: the section alone differs, and with it the path."""
+    cases = {"anisotropic section": (4.0, None), "isotropic section": (4.0, section(1.0, 1.0))}
+    scenes = {
+        name: circle(h, n_edges=n_edges, **BARE)
+        if given is None
+        else der.Scene(der.circle(), given, n_edges=n_edges, **BARE)  # type: ignore[arg-type]
+        for name, (h, given) in cases.items()
+    }
+    for name, scene in scenes.items():
+        done = measured(lambda scene=scene: der.fold(scene), repeats, memory=False)  # type: ignore[misc]
+        each = 1e6 * done.cpu / done.result.timing.newton_iterations
+        yield Row("need", f"{name}, per Newton iteration", each, "us")
+
+
+def _folding(h_over_t: float, wants: Mapping[str, object], n_edges: int) -> Callable[[], object]:
+    scene = circle(h_over_t, **{**BARE, "n_edges": n_edges, **wants})
+    return lambda: der.fold(scene)
+
+
+def _cost(work: Callable[[], object], repeats: int) -> tuple[float, int]:
+    done = measured(work, repeats)
+    return done.cpu, done.memory or 0
+
+
+def _added(seconds: float, memory: int) -> str:
+    return f"{1e3 * seconds:+.1f} ms, {1e-3 * memory:+.0f} kB"
