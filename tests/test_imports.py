@@ -273,7 +273,7 @@ def test_only_commands_import_validation_and_scenarios():
         ),
         ("rerun", {"der/view_layout.py", "der/view_rerun.py"}),
         ("dask", set()),
-        ("distributed", {"validation/workers.py"}),
+        ("distributed", {"validation/bench_phase.py", "validation/workers.py"}),
     ],
 )
 def test_shell_packages_stay_in_their_files(package, allowed):
