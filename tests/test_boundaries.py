@@ -1,11 +1,22 @@
 """Boundaries of folding modes, followed in two parameters."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from validation.conditions import Lost
+from validation.boundaries import boundaries
+from validation.cases import solve_case
+from validation.conditions import KINDS, Lost
+from validation.crossings import seeds
+from validation.families import family
 from validation.phase import phase, unexplained
+from validation.polygons import meetings
+from validation.scan import scan, solve_all
+from validation.store import Store
 from validation.tracing import corrected, trace
+from validation.workers import workers
 
 # of circles: the fold at pi, the cusp, the slope of the folded ring; closed form the last
 THRESHOLDS = {"foldability": 1.5075766, "snap-back": 1.839582, "stability": 3.4699278}
@@ -49,6 +60,116 @@ def test_stability_is_the_same_about_both_axes(diagram):
         if point.case.b_over_a == 0.8
     ]
     assert ends == pytest.approx([3.060680] * 2, abs=1e-6)
+
+
+CORNERS = {  # of ellipses about y: b/a, h/t, gamma; a dense bisection of labels agrees to 4e-6
+    ("exchange", "stability"): (0.784157664, 2.99846829, 2.66796943),
+    ("snap-back", "stability"): (0.924023364, 3.40999610, 2.04633864),
+    ("exchange", "foldability"): (0.775746065, 2.09776142, math.pi),
+}
+
+
+@pytest.fixture(scope="module")
+def about_y(tmp_path_factory):
+    """Fig. 3a, with the part in which boundaries meet, on a coarse grid."""
+    ranges = {"b_over_a": (0.75, 1.0), "h_over_t": (1.5, 4.0)}
+    found = family("fig3a", ranges=ranges, finest=8)
+    with Store(tmp_path_factory.mktemp("about_y") / "c.jsonl") as store, workers(2) as crew:
+        of = replace(found, sheets=("y",), coarse=8)
+        rows = scan(of, store, crew, progress=False).sorted_rows
+
+        def solve(cases):
+            new = [case for case in dict.fromkeys(cases) if case.key not in store.rows]
+            solve_all(new, store, crew)
+            return [store.rows[case.key] for case in cases]
+
+        return boundaries(of, rows, solve=solve)
+
+
+def test_corners_are_solved_for(about_y):
+    """Two conditions at once, to 1e-7 in both parameters; and no more corners than there are."""
+    found = {corner.kinds: corner.point for corner in about_y.corners}
+    assert set(found) == set(CORNERS)
+    for kinds, expected in CORNERS.items():
+        point = found[kinds]
+        place = (point.case.b_over_a, point.case.h_over_t, point.gamma)
+        assert place == pytest.approx(expected, abs=1e-7)
+        assert point.error < 1e-7
+
+
+def test_curves_meet_in_their_corners(about_y):
+    """Each corner is a point of a curve of either kind."""
+    for corner in about_y.corners:
+        for kind in corner.kinds:
+            places = [
+                (point.case.b_over_a, point.case.h_over_t)
+                for curve in about_y.curves
+                if curve.kind == kind
+                for point in curve.points
+            ]
+            assert (corner.point.case.b_over_a, corner.point.case.h_over_t) in places
+
+
+def test_ends_of_curves_are_corners_or_on_the_edge(about_y):
+    """No curve ends in the middle of nowhere, and the edge is met exactly."""
+    corners = {(c.point.case.b_over_a, c.point.case.h_over_t) for c in about_y.corners}
+    for curve in about_y.curves:
+        for point in (curve.points[0], curve.points[-1]):
+            b, h = point.case.b_over_a, point.case.h_over_t
+            assert b in (0.75, 1.0) or h in (1.5, 4.0) or (b, h) in corners
+
+
+def test_exchange_of_paths_has_errors_like_the_others(about_y):
+    """Below 1e-7 in h/t, where bisection of labels gives 4e-6; gamma far from pi."""
+    points = [p for c in about_y.curves if c.kind == "exchange" for p in c.points]
+    assert len(points) > 10
+    assert max(point.error for point in points) < 1e-7
+    assert points[0].gamma == pytest.approx(math.pi, abs=1e-9) or points[-1].gamma == pytest.approx(
+        math.pi, abs=1e-9
+    )
+    assert min(point.gamma for point in points) == pytest.approx(2.508011, abs=1e-5)
+
+
+@pytest.mark.parametrize(("beside", "foldable"), [(1e-4, True), (-1e-4, False)])
+def test_infinite_slope_bounds_foldability(beside, foldable):
+    """Triangle of 90 degrees, r/a from 0.033 to R_C by 3/8: a root of the slope's inverse.
+
+    The label of paths followed afresh changes there, without a fold on the foldable side.
+    """
+    of = family("fig8a")
+
+    def case(u):
+        return of.case("x", (2 / 3, 0.375, float(u[1])))
+
+    row = solve_case(case((0.0, 0.35)))
+    seed = next(seeds("infinite slope", row))
+
+    def value(u, state):
+        found = KINDS["infinite slope"].condition(case(u).scene(), state)
+        return found.value, found
+
+    low, high, state = 0.24, 0.35, seed
+    for u in np.linspace(high, low, 12):
+        below, state = value((0.0, u), state)
+    assert below < 0.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        now, _ = value((0.0, middle), state)
+        low, high = (middle, high) if now < 0.0 else (low, middle)
+    assert high - low < 1e-9
+    row = solve_case(case((0.0, low + beside)))
+    assert (row.foldable, row.folds) == (foldable, ())
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2])
+def test_polygons_cross_once(angle):
+    """Two lines at right angles, turned: in their known point, after the known corners."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    one = np.array([(0.0, 0.1), (0.5, 0.1), (1.0, 0.1)]) @ turn.T
+    other = np.array([(0.7, -1.0), (0.7, 0.0), (0.7, 1.0)]) @ turn.T
+    found = list(meetings(one, other))
+    assert [(m.first, m.second) for m in found] == [(1, 1)]
+    np.testing.assert_allclose(found[0].place, turn @ (0.7, 0.1), atol=1e-15)
 
 
 def circle(u, state):

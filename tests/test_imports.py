@@ -337,7 +337,7 @@ def test_only_commands_import_validation_and_scenarios():
         ("plotly", {"der/view_html.py"}),
         ("elastica", {"validation/bench_elastica.py"}),
         ("dask", set()),
-        ("distributed", {"validation/workers.py"}),
+        ("distributed", {"validation/bench_phase.py", "validation/workers.py"}),
     ],
 )
 def test_shell_packages_stay_in_their_files(package, allowed):

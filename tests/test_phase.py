@@ -3,6 +3,7 @@
 import csv
 import math
 import multiprocessing
+import time
 from collections import Counter
 from concurrent.futures import Executor, Future
 from dataclasses import replace
@@ -11,12 +12,15 @@ import numpy as np
 import pytest
 
 import der
+from validation import bench_phase, killed
+from validation.boundaries import Boundaries
 from validation.cases import LABELS, Row
 from validation.edges import BoundaryPoint, Curve, scanned_boundaries
 from validation.families import family
 from validation.figures import draw
 from validation.phase import phase, run_phase
-from validation.phase_plot import FINER, NAMES, save_diagram
+from validation.phase_plot import NAMES, save_diagram
+from validation.phase_plot import _others as others
 from validation.phase_plot import _regions as regions
 from validation.phase_plot import _segments as pieces
 from validation.rod_check import rod_check, table
@@ -59,7 +63,8 @@ def without_curves():
     """Boundaries as the scan sees them: following them is tested by itself."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "validation.phase._boundaries", lambda found, store, crew: scanned_boundaries(found)
+            "validation.phase._boundaries",
+            lambda found, *rest: Boundaries(scanned_boundaries(found), []),
         )
         yield
 
@@ -82,7 +87,7 @@ def diagram(folder, without_curves):
 def test_files_are_written(diagram, folder):
     """Tables and picture; the store beside them."""
     names = {file.name for file in diagram.files}
-    assert names == {"cases.csv", "boundaries.csv", "check.csv", "fig3a.png"}
+    assert names == {"cases.csv", "boundaries.csv", "corners.csv", "check.csv", "fig3a.png"}
     assert {file.name for file in folder.iterdir()} == names | {"cases.jsonl"}
     assert (folder / "fig3a.png").read_bytes().startswith(FORMAT)
 
@@ -259,13 +264,13 @@ def test_colours_change_where_the_boundary_is(tmp_path):
     places = zip(0.5 + 0.3 * np.cos(turn), 0.5 + 0.3 * np.sin(turn), strict=True)
     points = [BoundaryPoint(of.case("x", place), math.pi, 0.0, 0.0) for place in places]
     curves = [Curve("foldability", "x", tuple(points))]
-    at = (np.arange(16 * FINER) + 0.5) / (16 * FINER) - 0.5
-    radius = np.hypot(*np.meshgrid(at, at, indexing="ij"))
-    clear = np.abs(radius - 0.3) > 0.1 / 16
-    wrong = [
-        ((regions(found, "x", None, pieces(of, "x", lines)) > 0) != (radius < 0.3)) & clear
-        for lines in (curves, [])
-    ]
+    wrong = []
+    for lines in (curves, []):
+        colours = regions(found, "x", None, pieces(of, "x", lines))
+        at = (np.arange(len(colours)) + 0.5) / len(colours) - 0.5
+        radius = np.hypot(*np.meshgrid(at, at, indexing="ij"))
+        clear = np.abs(radius - 0.3) > 0.1 / 16
+        wrong.append(((colours > 0) != (radius < 0.3)) & clear)
     assert [int(pixels.sum()) > 0 for pixels in wrong] == [False, True]
 
 
@@ -301,6 +306,58 @@ def test_failed_cases_have_a_colour_of_their_own(tmp_path):
     found = scanned(family("fig5c", finest=16), tmp_path, fails)
     save_diagram(found, [], tmp_path / "failed.png")
     assert NAMES[-1] == "failed"
+
+
+def test_a_wedge_between_nodes_is_coloured(tmp_path):
+    """A band of a fifth of a cell that no node lies in: by the cases solved beside its curves."""
+    of = family("fig5c", finest=16)
+
+    def band(case):
+        y = (case.h_over_t - 1.0) / 3.0 * 16
+        k = int(y > 8.4) + int(y > 8.6)
+        names = (LABELS[0], LABELS[2], LABELS[1])
+        return Row(case, names[k], k > 0, False, "none", moment=0.0, slope=-1.0)
+
+    found = scanned(of, tmp_path, band)
+    curves, beside = [], []
+    for kind, y in (("foldability", 8.4), ("snap-back", 8.6)):
+        points = [BoundaryPoint(of.case("x", (x, y / 16)), 3.0, 0.0, 0.0) for x in (0.0, 1.0)]
+        curves.append(Curve(kind, "x", tuple(points)))
+    places = [((k + 0.5) / 16, y / 16) for k in range(16) for y in (8.35, 8.45, 8.55, 8.65)]
+    beside = [band(of.case("x", place)) for place in places]
+    wrong = []
+    for rows in (beside, []):
+        colours = regions(found, "x", None, pieces(of, "x", curves), others(of, "x", rows))
+        y = (np.arange(len(colours)) + 0.5) / len(colours) * 16
+        expected = np.array([0, 2, 1])[(y > 8.4).astype(int) + (y > 8.6)]
+        wrong.append(int((colours != expected).sum()))
+    assert wrong[0] == 0
+    assert wrong[1] > 0
+
+
+# --- What it takes ---------------------------------------------------------------------------
+
+
+def test_bench_adds_up_what_cases_take():
+    """Every case once; the CPU time of this process is not more than it has had."""
+    before = time.process_time()
+    cases = bench_phase._cases(3)
+    wall, cpu = bench_phase._wall(cases, Here(), bench_phase.timed)
+    assert len(set(cases)) == 9
+    assert 0.0 < cpu <= time.process_time() - before
+    assert wall > 0.0
+
+
+def test_killed_command_refuses_what_it_cannot_do(tmp_path, capsys):
+    """A folder with files in it, and no kills at all."""
+    (tmp_path / "file").write_text("")
+    for options, words in (
+        (["--out", str(tmp_path)], "out must be an empty folder"),
+        (["--times", "0"], "times must be a whole number from 1, got 0"),
+    ):
+        with pytest.raises(SystemExit):
+            killed.main(options)
+        assert words in capsys.readouterr().err
 
 
 # --- The rod ---------------------------------------------------------------------------------

@@ -1,11 +1,13 @@
 """The boundaries between folding modes, as curves through a phase diagram.
 
-Wherever neighbouring cases of a scan differ, something happens between them. Three things are
+Wherever neighbouring cases of a scan differ, something happens between them. Five things are
 conditions that can be followed across the diagram (`conditions`, `tracing`): the folded state loses
-its stability; the fold at which the path turns back reaches gamma = pi; two folds merge in a cusp.
-A fourth is found by bisection of the label between the two cases: the path from the flat ring
-changes partners with another one, and leads elsewhere ("exchange"). A curve is kept where the
-labels on its two sides, solved for, differ by what it bounds.
+its stability; the fold at which the path turns back reaches gamma = pi; it merges there with its
+mirror image, in the folded state, whose slope is infinite then; two folds merge in a cusp; the path
+from the flat ring changes partners with another one ("exchange"): it leads elsewhere then, or
+leaves folds behind on a closed one. Where curves meet, the corner is solved for (`corners`). A
+curve is kept from corner to corner where the labels on its two sides, solved for, differ by what it
+bounds. What no condition explains is found by bisection of the label between two cases.
 """
 
 from __future__ import annotations
@@ -13,29 +15,28 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
-from itertools import pairwise, repeat
 from typing import NamedTuple
 
 import numpy as np
 
-from der.unfinished import NotConverged
 from validation.cases import Case, Row, solve_case
-from validation.collocation import Failure, Solution, collocation
-from validation.conditions import KINDS, Lost, Value, fresh
-from validation.edges import BoundaryPoint, Curve
+from validation.conditions import KINDS, Lost, Value, fresh, on
+from validation.corners import FOLD, Line, Met, mark_corners
+from validation.crossings import Crossing, Placed, crossings_of, differences, seeds
+from validation.edges import BoundaryPoint, Corner, Curve
 from validation.families import Family
 from validation.gauss import Array
-from validation.sectors import sector
-from validation.solving import solve_visits
-from validation.tracing import At, corrected, trace
+from validation.polygons import distance
+from validation.tracing import At, Function, corrected, trace
 
-SEED = 1e-9  # tolerance of the path that a condition starts from: it fixes the mesh carried along
-BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for
+BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for,
+CLOSEST = 1e-4  # and beside one with another near it, at least: nearer, labels do not tell
+NARROW = 1e-3  # of the side: cases so near to each other have the state that a condition needs
 BISECTED = 1e-6  # of the diagram's side
 SAME_CURVE = 1e-3  # of the diagram's side: above what chords leave of a curve
 REACH = 3.0  # gaps of the scan within which a crossing must find its curve
 EXCHANGE = "exchange"
+INFINITE = "infinite slope"
 
 
 Solve = Callable[[Sequence[Case]], Sequence[Row]]  # cases -> their rows, in the same order
@@ -46,95 +47,100 @@ def one_by_one(cases: Sequence[Case]) -> list[Row]:
     return [solve_case(case) for case in cases]
 
 
-def boundaries(
-    family: Family,
-    rows: Sequence[Row],
-    *,
-    solve: Solve = one_by_one,
-    side_by_side: Callable[..., Iterable[list[Curve]]] | None = None,
-) -> list[Curve]:
-    """Boundaries of a diagram from the rows of its scan; of a cube, slice by slice.
+class Boundaries(NamedTuple):
+    """The boundaries of a diagram and their corners."""
 
-    Slices of a cube are those of the scan's coarsest values of the second coordinate.
+    curves: list[Curve]
+    corners: list[Corner]
+
+
+def boundaries(family: Family, rows: Sequence[Row], *, solve: Solve = one_by_one) -> Boundaries:
+    """Boundaries of a diagram from the rows of its scan; of a cube, slice by slice.
 
     Parameters
     ----------
-    solve : how the cases beside curves and between neighbours are solved, many at a time; used
-        where the slices are not shared out.
-    side_by_side : such as the `map` of an executor, to share out slices where there are several.
+    solve : how the cases beside curves and between neighbours are solved, many at a time
     """
-    slices = [
-        (sheet, plane, placed)
-        for sheet in family.sheets
-        for plane, placed in _slices(family, sheet, rows)
-    ]
-    if side_by_side is not None and len(slices) > 1:
-        found = side_by_side(_slice_curves, repeat(family), *zip(*slices, strict=True))
-    else:
-        found = (
-            _Diagram(family, sheet, plane, solve).curves(placed) for sheet, plane, placed in slices
-        )
-    return [curve for curves in found for curve in curves]
+    parts = [_Diagram(part, solve).boundaries() for part in slices(family, rows)]
+    return joined(parts)
 
 
-def _slice_curves(family: Family, sheet: str, plane: float | None, placed: Placed) -> list[Curve]:
-    """The boundaries of one slice."""
-    return _Diagram(family, sheet, plane, one_by_one).curves(placed)
+def joined(parts: Iterable[Boundaries]) -> Boundaries:
+    """The boundaries of all slices."""
+    found = Boundaries([], [])
+    for part in parts:
+        found.curves.extend(part.curves)
+        found.corners.extend(part.corners)
+    return found
 
 
-Placed = dict[tuple[float, float], Row]  # rows by their place in the unit square
+class Slice(NamedTuple):
+    """A unit square of a family, and what a scan has found there."""
+
+    family: Family
+    sheet: str
+    plane: float | None  # second coordinate, of a cube
+    placed: Placed
+
+    def has(self, case: Case) -> bool:
+        """Whether a case lies in it."""
+        unit = self.family.unit(case)
+        if unit is None or (case.twist_axis != self.sheet and case.b_over_a != 1.0):
+            return False
+        return self.plane is None or abs(unit[1] - self.plane) < 1e-9
 
 
-def _slices(
-    family: Family, sheet: str, rows: Sequence[Row]
-) -> Iterator[tuple[float | None, Placed]]:
-    """Rows of a sheet by their place in the square; a cube's by its second coordinate."""
-    slices: dict[float | None, Placed] = defaultdict(dict)
+def slice_boundaries(
+    part: Slice, known: Sequence[Row], solve: Callable[[Case], Row]
+) -> tuple[Boundaries, list[Row]]:
+    """The boundaries of one slice, and the rows of the cases solved for it besides those known."""
+    rows = {row.case: row for row in known}
+    new: list[Row] = []
+
+    def all_of(cases: Sequence[Case]) -> list[Row]:
+        for case in dict.fromkeys(cases):
+            if case not in rows:
+                rows[case] = solve(case)
+                new.append(rows[case])
+        return [rows[case] for case in cases]
+
+    return _Diagram(part, all_of).boundaries(), new
+
+
+def slices(family: Family, rows: Sequence[Row]) -> list[Slice]:
+    """The squares of a diagram; of a cube at the scan's coarsest values of the second coordinate.
+
+    Each with the rows in it, by their place.
+    """
+    found: dict[tuple[str, float | None], Placed] = defaultdict(dict)
     for row in rows:
         unit = family.unit(row.case)
         if unit is None or not row.ok:
             continue
-        if row.case.twist_axis != sheet and row.case.b_over_a != 1.0:
-            continue
-        if family.dimension == 2:
-            slices[None][(unit[0], unit[1])] = row
-        else:
+        plane = None
+        if family.dimension == 3:
             middle = round(unit[1] * family.coarse)
-            if abs(unit[1] * family.coarse - middle) < 1e-6:
-                slices[middle / family.coarse][(unit[0], unit[2])] = row
-    yield from sorted(slices.items(), key=lambda item: (item[0] is not None, item[0] or 0.0))
-
-
-class _Crossing(NamedTuple):
-    """Two neighbouring cases of different modes."""
-
-    kind: str
-    a: tuple[float, float]
-    b: tuple[float, float]
-    first: Row
-    second: Row
-
-    @property
-    def gap(self) -> float:
-        return math.dist(self.a, self.b)
-
-    @property
-    def middle(self) -> Array:
-        return 0.5 * (np.array(self.a) + np.array(self.b))
-
-    def halved(self, place: tuple[float, float], row: Row) -> _Crossing:
-        """The half in which one case is foldable and the other is not."""
-        if row.foldable == self.first.foldable:
-            return self._replace(a=place, first=row)
-        return self._replace(b=place, second=row)
+            if abs(unit[1] * family.coarse - middle) > 1e-6:
+                continue
+            plane = middle / family.coarse
+        for sheet in family.sheets:
+            if row.case.twist_axis == sheet or row.case.b_over_a == 1.0:
+                found[sheet, plane][unit[0], unit[-1]] = row
+    return [
+        Slice(family, sheet, plane, placed)
+        for (sheet, plane), placed in sorted(
+            found.items(), key=lambda item: (family.sheets.index(item[0][0]), item[0][1] or 0.0)
+        )
+    ]
 
 
 class _Diagram:
     """One unit square of a family: its cases, and what happens between them."""
 
-    def __init__(self, family: Family, sheet: str, plane: float | None, solve: Solve) -> None:
-        self.family, self.sheet, self.plane, self.solve = family, sheet, plane, solve
-        low, high = family.ranges[-1]
+    def __init__(self, part: Slice, solve: Solve) -> None:
+        self.family, self.sheet, self.plane, self.placed = part
+        self.solve = solve
+        low, high = self.family.ranges[-1]
         self.height = high - low  # of h/t
 
     def case(self, u: Array | tuple[float, float]) -> Case:
@@ -143,61 +149,60 @@ class _Diagram:
         unit = (x, y) if self.plane is None else (x, self.plane, y)
         return self.family.case(self.sheet, unit)
 
-    def curves(self, placed: Placed) -> list[Curve]:
+    def boundaries(self) -> Boundaries:
         """All boundaries between the cases of a scan."""
-        traced: list[tuple[str, list[At[Value]]]] = []
-
-        def explained(crossing: _Crossing) -> bool:
-            return any(
-                kind == crossing.kind and _passes(points, crossing) for kind, points in traced
-            )
-
-        crossings = _crossings(placed)
+        lines: list[Line] = []
+        crossings = crossings_of(self.placed)
         for crossing in crossings:  # one after the other: a curve explains many
-            points = [] if explained(crossing) else self._traced(crossing)
-            if points and not _known(crossing.kind, points, traced):
-                traced.append((crossing.kind, points))
-        exchanges: list[BoundaryPoint] = []
-        left = [c for c in crossings if c.kind == "foldability" and not explained(c)]
-        for narrow in self._bisected(left):
-            # so close to the boundary the fold that makes it, if one does, is at pi
-            if explained(narrow):
-                continue
-            points = self._traced(narrow)
-            if points and not _known(narrow.kind, points, traced):
-                traced.append((narrow.kind, points))
-            elif not points:
-                exchanges.append(self._exchange(narrow))
-        curves = [
-            Curve(kind, self.sheet, tuple(self._point(kind, at) for at in piece))
-            for kind, piece in self._kept(traced)
+            if not _explained(crossing, lines):
+                self._trace(crossing, lines)
+        kept, met = self._kept(lines)
+        left = [crossing for crossing in crossings if not _explained(crossing, kept)]
+        found = len(lines)
+        left = self._bisected(left, NARROW)
+        for narrow in left:
+            # so close to the boundary the state that makes it is almost there
+            if not _explained(narrow, kept):
+                self._trace(narrow, lines)
+        if len(lines) > found:
+            kept, met = self._kept(lines)
+            left = [narrow for narrow in left if not _explained(narrow, kept)]
+        curves = [self._curve(line) for line in kept]
+        points: dict[str, list[BoundaryPoint]] = defaultdict(list)
+        for narrow in self._bisected(left, BISECTED):
+            points[narrow.kind].append(self._between(narrow))
+        curves += [
+            Curve(f"{kind} (bisected)", self.sheet, chain)
+            for kind, some in points.items()
+            for chain in self._chains(some)
         ]
-        return curves + [
-            Curve(EXCHANGE, self.sheet, chain) for chain in self._chains(exchanges) if chain
-        ]
+        return Boundaries(curves, [self._corner(one) for one in met])
 
     # --- curves of a condition ---
 
-    def _traced(self, crossing: _Crossing) -> list[At[Value]]:
+    def _trace(self, crossing: Crossing, lines: list[Line]) -> None:
+        """Add the curves that may bound what differs between two cases, until one does."""
+        for kind in _bounding(crossing.kind):
+            points = self._traced(kind, crossing)
+            if points and not _known(kind, points, lines):
+                lines.append(Line(kind, points, [None] * len(points)))
+            if points and _explained(crossing, lines):
+                return
+
+    def _traced(self, kind: str, crossing: Crossing) -> list[At[Value]]:
         """The curve between two cases, followed to its ends; none where no condition finds one."""
+        condition = self._condition(kind)
         for row, place in ((crossing.first, crossing.a), (crossing.second, crossing.b)):
-            for seed in _seeds(crossing.kind, row):
+            for seed in seeds(kind, row):
                 try:
-                    near = corrected(
-                        self._condition(crossing.kind),
-                        np.array(place),
-                        seed,
-                        near=REACH * crossing.gap,
-                    )
-                    if _apart(near.u, crossing) < REACH * crossing.gap:
-                        return trace(
-                            self._condition(crossing.kind), near.u, near.state, fresh=fresh
-                        )
+                    near = corrected(condition, np.array(place), seed, near=REACH * crossing.gap)
+                    if crossing.apart(near.u) < REACH * crossing.gap:
+                        return trace(condition, near.u, near.state, fresh=fresh)
                 except Lost:
                     continue
         return []
 
-    def _condition(self, kind: str):  # type: ignore[no-untyped-def]
+    def _condition(self, kind: str) -> Function[Value]:
         condition = KINDS[kind].condition
 
         def value(u: Array, seed: Value) -> tuple[float, Value]:
@@ -209,72 +214,73 @@ class _Diagram:
 
         return value
 
-    def _point(self, kind: str, at: At[Value]) -> BoundaryPoint:
+    def _curve(self, line: Line) -> Curve:
+        points = [
+            self._point(at, self._error(line.kind, at) if met is None else self.height * met.error)
+            for at, met in zip(line.points, line.corners, strict=True)
+        ]
+        return Curve(line.kind, self.sheet, tuple(points))
+
+    def _corner(self, met: Met) -> Corner:
+        point = self._point(met.first, self.height * met.error)
+        return Corner(met.kinds, self.sheet, point)
+
+    def _point(self, at: At[Value], error: float) -> BoundaryPoint:
         state = at.state.at
-        return BoundaryPoint(self.case(at.u), state.gamma, state.moment, self._error(kind, at))
+        return BoundaryPoint(self.case(at.u), state.gamma, state.moment, error)
 
     def _error(self, kind: str, at: At[Value]) -> float:
         """Error of the place in h/t: what is left of the condition, and what halving changes."""
-        value, state, system = at.state
-        fine = system.on(state.mesh.halved, state)
-        if isinstance(fine, Failure):
-            return math.inf
+        state = at.state
         try:
-            change = self._condition(kind)(at.u, Value(value, fine, system))[0] - value
+            fine = on(state.at.mesh.halved, state)
+            change = self._condition(kind)(at.u, fine)[0] - state.value
         except Lost:
             return math.inf
         return self.height * (at.distance + abs(change) / float(np.linalg.norm(at.gradient)))
 
-    def _kept(self, traced: list[tuple[str, list[At[Value]]]]) -> list[tuple[str, list[At[Value]]]]:
-        """Pieces of curves on whose two sides the modes differ by their kind, each once."""
-        beside = [
-            self.case(place)
-            for _, points in traced
-            for k in range(len(points))
-            for place in _beside(points, k)
+    def _kept(self, lines: list[Line]) -> tuple[list[Line], list[Met]]:
+        """Pieces of curves on whose two sides the modes differ by their kind, and their corners."""
+        lines = [Line(line.kind, list(line.points), [None] * len(line.points)) for line in lines]
+        met = mark_corners(lines, self._condition)
+        sides = [
+            [_beside(line, k, lines) if c is None else [] for k, c in enumerate(line.corners)]
+            for line in lines
         ]
+        beside = [self.case(u) for line in sides for places in line for u in places]
         rows = iter(self.solve(beside))
-        pieces: list[tuple[str, list[At[Value]]]] = []
-        for kind, points in traced:
-            piece: list[At[Value]] = []
-            for at in [*points, None]:
-                if at is not None and kind in _differences(next(rows), next(rows)):
-                    piece.append(at)
-                    continue
-                if len(piece) > 1:
-                    pieces.append((kind, piece))
-                piece = []
-        pieces.sort(key=lambda item: -len(item[1]))
-        kept: list[tuple[str, list[At[Value]]]] = []
-        for kind, piece in pieces:
-            if not _known(kind, piece, kept):
-                kept.append((kind, piece))
-        return kept
+        pieces: list[Line] = []
+        for line, own in zip(lines, sides, strict=True):
+            holds = [_bounds(line.kind, next(rows), next(rows)) if u else None for u in own]
+            pieces += _pieces(line, holds)
+        pieces.sort(key=lambda piece: -len(piece.points))
+        kept: list[Line] = []
+        for piece in pieces:
+            if not _known(piece.kind, piece.points, kept):
+                kept.append(piece)
+        there = {(corner, piece.kind) for piece in kept for corner in piece.corners}
+        return kept, [one for one in met if all((one, kind) in there for kind in one.kinds)]
 
     # --- what only the label tells ---
 
-    def _bisected(self, crossings: list[_Crossing]) -> list[_Crossing]:
-        """Two cases between each two, close together, one of them foldable; all in lockstep."""
-        while crossings and max(crossing.gap for crossing in crossings) > BISECTED:
+    def _bisected(self, crossings: list[Crossing], width: float) -> list[Crossing]:
+        """Two cases between each two, so close together, that differ likewise; in lockstep."""
+        while crossings and max(crossing.gap for crossing in crossings) > width:
             middles = [crossing.middle for crossing in crossings]
             rows = self.solve([self.case(middle) for middle in middles])
-            crossings = [
+            halves = [
                 crossing.halved((float(middle[0]), float(middle[1])), row)
                 for crossing, middle, row in zip(crossings, middles, rows, strict=True)
-                if row.ok
             ]
+            crossings = [half for half in halves if half is not None]
         return crossings
 
-    def _exchange(self, narrow: _Crossing) -> BoundaryPoint:
-        """The place where paths exchange, with the last fold before pi on the foldable side."""
-        good, bad = narrow.first, narrow.second
-        if not good.foldable:
-            good, bad = bad, good
+    def _between(self, narrow: Crossing) -> BoundaryPoint:
+        """The place between two cases, with the last fold of the one that has any."""
+        row = narrow.first if narrow.first.folds else narrow.second
+        gamma = max(row.folds, default=math.nan)
         error = self.height * narrow.gap
-        moment = 0.0 if bad.moment is None else bad.moment
-        return BoundaryPoint(
-            self.case(narrow.middle), max(good.folds, default=math.pi), moment, error
-        )
+        return BoundaryPoint(self.case(narrow.middle), gamma, math.nan, error)
 
     def _chains(self, points: list[BoundaryPoint]) -> Iterator[tuple[BoundaryPoint, ...]]:
         """Points in the order of their curves: each the nearest to the one before."""
@@ -292,95 +298,83 @@ class _Diagram:
                 chain.append(left.pop(k))
             else:
                 chain.append(left.pop(0))
-        yield tuple(p for _, p in chain)
+        if chain:
+            yield tuple(p for _, p in chain)
 
     def _place(self, case: Case) -> tuple[float, float]:
-        unit = self.family.unit(replace(case)) or (0.0,) * self.family.dimension
+        unit = self.family.unit(case) or (0.0,) * self.family.dimension
         return unit[0], unit[-1]
 
 
-def _crossings(placed: Placed) -> list[_Crossing]:
-    """Neighbours along either coordinate whose modes differ, the closest ones first."""
-    found = []
-    for axis in (1, 0):
-        lines: dict[float, list[tuple[float, float]]] = defaultdict(list)
-        for place in placed:
-            lines[place[1 - axis]].append(place)
-        for line in lines.values():
-            line.sort(key=lambda place: place[axis])
-            for a, b in pairwise(line):
-                ends = placed[a], placed[b]
-                found += [_Crossing(kind, a, b, *ends) for kind in _differences(*ends)]
-    return sorted(found, key=lambda crossing: crossing.gap)
-
-
-def _differences(a: Row, b: Row) -> list[str]:
-    """What must lie between two cases."""
-    if not (a.ok and b.ok):
-        return []
-    if a.foldable != b.foldable:
-        return ["foldability"]
-    if not a.foldable:
-        return []
-    kinds = ["stability"] if a.stable != b.stable else []
-    return kinds + (["snap-back"] if a.snapping != b.snapping else [])
-
-
-def _beside(points: list[At[Value]], k: int) -> list[Array]:
-    """Two places, one on each side of a curve at its k-th point."""
-    way = points[min(k + 1, len(points) - 1)].u - points[max(k - 1, 0)].u
-    normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
-    return [np.clip(points[k].u + sign * BESIDE * normal, 0.0, 1.0) for sign in (1.0, -1.0)]
-
-
-def _known(kind: str, points: list[At[Value]], traced: list[tuple[str, list[At[Value]]]]) -> bool:
-    """Whether a curve has been followed before: its middle lies on one of the same kind."""
-    middle = points[len(points) // 2].u
+def _explained(crossing: Crossing, lines: Iterable[Line]) -> bool:
+    """Whether a curve that bounds what differs passes between two cases, or close by."""
+    kinds = _bounding(crossing.kind)
+    reach = max(0.75 * crossing.gap, SAME_CURVE)
     return any(
-        other == kind and _distance(middle, old) < SAME_CURVE for other, old in traced if old
+        line.kind in kinds and distance(crossing.middle, line.places) < reach for line in lines
     )
 
 
-def _passes(points: Sequence[At[Value]], crossing: _Crossing) -> bool:
-    """Whether a curve passes between two neighbouring cases, or close by."""
-    return _distance(crossing.middle, points) < max(0.75 * crossing.gap, SAME_CURVE)
+def _known(kind: str, points: Sequence[At[Value]], lines: Iterable[Line]) -> bool:
+    """Whether a curve has been followed before: its middle lies on one of the same kind."""
+    middle = points[len(points) // 2].u
+    return any(line.kind == kind and distance(middle, line.places) < SAME_CURVE for line in lines)
 
 
-def _distance(place: Array, points: Sequence[At[Value]]) -> float:
-    """Distance of a place from the polygon through the points of a curve."""
-    u = np.array([at.u for at in points])
-    a, way = u[:-1], np.diff(u, axis=0)
-    square = np.maximum((way**2).sum(axis=1), 1e-300)
-    along = np.clip(((place - a) * way).sum(axis=1) / square, 0.0, 1.0)
-    apart = np.linalg.norm(a + along[:, None] * way - place, axis=1)
-    return float(apart.min(initial=math.inf))
+def _beside(line: Line, k: int, lines: Iterable[Line]) -> list[Array]:
+    """Two places, one on each side of a curve at its k-th point, with no other curve between.
+
+    None where another one is too near.
+    """
+    places = line.places
+    way = places[min(k + 1, len(places) - 1)] - places[max(k - 1, 0)]
+    normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
+    free = min(
+        (distance(places[k], other.places) for other in lines if other.kind != line.kind),
+        default=math.inf,
+    )
+    reach = min(BESIDE, 0.3 * free)
+    if reach < CLOSEST:
+        return []
+    return [np.clip(places[k] + sign * reach * normal, 0.0, 1.0) for sign in (1.0, -1.0)]
 
 
-def _apart(u: Array, crossing: _Crossing) -> float:
-    """Distance of a place from the line between two cases."""
-    a, b = np.array(crossing.a), np.array(crossing.b)
-    along = min(max(float((u - a) @ (b - a)) / crossing.gap**2, 0.0), 1.0)
-    return float(np.linalg.norm(u - a - along * (b - a)))
+def _bounds(kind: str, one: Row, other: Row) -> bool:
+    """Whether two cases differ by what a curve of this kind bounds."""
+    return any(kind in _bounding(what) for what in differences(one, other))
 
 
-def _seeds(kind: str, row: Row) -> Iterator[Value]:
-    """Solutions of a case from which a condition may start, the likeliest first."""
-    if not row.foldable:
-        return
-    scene = row.case.scene(save_at=())
-    try:
-        _, visits = solve_visits(scene, tolerance=SEED)
-    except NotConverged:
-        return
-    system = collocation(sector(scene))
-    folds = [visit.at for visit in visits if visit.kind == "fold"]
-    chosen: list[Solution]
-    if kind == "stability":
-        chosen = [visits[-1].at]
-    elif kind == "foldability":
-        chosen = sorted(folds, key=lambda at: -at.gamma)[:1]
-    else:
-        pairs = sorted(pairwise(folds), key=lambda pair: abs(pair[0].gamma - pair[1].gamma))
-        chosen = [at for pair in pairs for at in pair]
-    for at in chosen:
-        yield Value(0.0, at, system)
+def _bounding(what: str) -> tuple[str, ...]:
+    """Kinds of boundaries at which this changes, the likeliest first."""
+    return (FOLD, INFINITE, EXCHANGE) if what == FOLD else (what, EXCHANGE)
+
+
+def _pieces(line: Line, holds: Sequence[bool | None]) -> list[Line]:
+    """A curve's pieces that bound something, to the corners at their ends.
+
+    Parameters
+    ----------
+    holds : whether the modes on the two sides of a point differ; None: a corner, or so near to
+        another curve that they do not tell
+    """
+    kept = [held is True for held in holds]
+    for k in [k for k, held in enumerate(holds) if held]:
+        for way in (1, -1):
+            end = k + way
+            while 0 <= end < len(holds) and holds[end] is None and line.corners[end] is None:
+                end += way
+            beyond = not 0 <= end < len(holds)
+            if beyond or holds[end] is not False:
+                inside = range(k, end, way) if beyond else range(k, end + way, way)
+                for j in inside:
+                    kept[j] = True
+    pieces = []
+    start = None
+    for k, held in enumerate([*kept, False]):
+        if held and start is None:
+            start = k
+        elif not held and start is not None:
+            if k - start > 1:
+                pieces.append(Line(line.kind, line.points[start:k], line.corners[start:k]))
+            start = None
+    return pieces

@@ -1,8 +1,10 @@
 """What holds on a boundary between folding modes, as a function of the ring and its section.
 
-    stability     the folded state at gamma = pi has dM/dgamma = 0
-    foldability   the fold at which the path turns back lies at gamma = pi
-    snap-back     two folds merge: dgamma/ds has an extremum that is zero (a cusp)
+    stability        the folded state at gamma = pi has dM/dgamma = 0
+    foldability      the fold at which the path turns back lies at gamma = pi
+    infinite slope   the folded state is where the path turns back: dgamma/dM = 0 there
+    snap-back        two folds merge: dgamma/ds has an extremum that is zero (a cusp)
+    exchange         the path from the flat ring meets another one, and beyond follows that
 
 Each is the value of a function of two parameters, evaluated by a few corrections from a solution
 nearby: no path is followed. Solutions are carried from ring to ring on meshes that scale segment by
@@ -20,12 +22,16 @@ import numpy as np
 
 from der.scene import Scene
 from validation.collocation import Collocation, Direction, Failure, Solution, collocation
-from validation.meshes import fitted, mesh_at
+from validation.corrector import observe
+from validation.exchanges import Centre, centre, shot
+from validation.gauss import Array
+from validation.meshes import Mesh, fitted, mesh_at, moved_to
 from validation.sectors import sector
 
 ACCURATE = 1e-9  # of gamma/pi and M: beyond, a mesh is fitted again
 TIGHT = 1e-11  # increments of a solution from which a condition is judged
 PROBE = 1e-3  # of s: first step of a secant
+BULGE = 1e-2  # of s: for a third derivative
 SMALL = 1e-10  # of s: a secant step that has converged
 FARTHEST = 0.5  # of s: what lies farther is another state
 MOST = 20
@@ -41,6 +47,7 @@ class Value(NamedTuple):
     value: float
     at: Solution
     system: Collocation
+    psi: Array | None = None  # of an exchange, see `exchanges`: its state has no tangent
 
 
 Condition = Callable[[Scene, Value], Value]
@@ -54,13 +61,7 @@ def carried(scene: Scene, seed: Value) -> tuple[Collocation, Solution]:
     Lost
         Where the rings have other segments, or no solution is near.
     """
-    system = collocation(sector(scene))
-    old, new = seed.system.sector, system.sector
-    if len(old.joints) != len(new.joints):
-        raise Lost(f"the ring has {len(new.joints) - 1} segments, not {len(old.joints) - 1}")
-    nodes = np.interp(seed.at.mesh.nodes, old.joints, new.joints)
-    nodes[-1] = new.joints[-1]
-    mesh = mesh_at(new, system.rule, nodes)
+    system, mesh = _scaled(scene, seed)
     at = seed.at
     found = system.solved(
         mesh, Direction(at.frames, at.p, at.gamma), at.tangent, tolerance=TIGHT, iterations=15
@@ -70,17 +71,59 @@ def carried(scene: Scene, seed: Value) -> tuple[Collocation, Solution]:
     return system, found
 
 
+def _scaled(scene: Scene, seed: Value) -> tuple[Collocation, Mesh]:
+    """The seed's mesh for another ring, segment by segment."""
+    system = collocation(sector(scene))
+    old, new = seed.system.sector, system.sector
+    if len(old.joints) != len(new.joints):
+        raise Lost(f"the ring has {len(new.joints) - 1} segments, not {len(old.joints) - 1}")
+    nodes = np.interp(seed.at.mesh.nodes, old.joints, new.joints)
+    nodes[-1] = new.joints[-1]
+    return system, mesh_at(new, system.rule, nodes)
+
+
+def on(mesh: Mesh, seed: Value) -> Value:
+    """The same state on another mesh.
+
+    Raises
+    ------
+    Lost
+        Where it cannot be solved for there.
+    """
+    system, at = seed.system, seed.at
+    if seed.psi is None:
+        found = system.on(mesh, at)
+        if isinstance(found, Failure):
+            raise Lost(found.reason)
+        return seed._replace(at=found)
+    frames = moved_to(at.mesh, at.nodes[:-1], at.frames, mesh.stages)
+    return _exchanged(system, mesh, frames, seed)
+
+
 def fresh(seed: Value) -> Value:
     """The same solution on a mesh fitted to it, where its own has become too coarse."""
-    system, at = seed.system, seed.at
-    error = system.error(at)
-    size = max(error.gamma / math.pi, error.moment / max(abs(at.moment), 1.0))
-    if size <= ACCURATE:
+    at = seed.at
+    try:
+        size = _size(seed)
+        if size <= ACCURATE:
+            return seed
+        factor = min((size / (0.1 * ACCURATE)) ** 0.125, 2.0)
+        n = math.ceil(factor * len(at.mesh.h))
+        return on(fitted(at.mesh, at.nodes[:-1], at.frames, n), seed)
+    except Lost:
         return seed
-    factor = min((size / (0.1 * ACCURATE)) ** 0.125, 2.0)
-    n = math.ceil(factor * len(at.mesh.h))
-    found = system.on(fitted(at.mesh, at.nodes[:-1], at.frames, n), at)
-    return seed if isinstance(found, Failure) else seed._replace(at=found)
+
+
+def _size(seed: Value) -> float:
+    """The error of a state's gamma/pi and M."""
+    system, at = seed.system, seed.at
+    if seed.psi is None:
+        error = system.error(at)
+        gamma, moment = error.gamma, error.moment
+    else:
+        fine = on(at.mesh.halved, seed).at
+        gamma, moment = abs(fine.gamma - at.gamma), abs(fine.moment - at.moment)
+    return max(gamma / math.pi, moment / max(abs(at.moment), 1.0))
 
 
 def stability(scene: Scene, seed: Value) -> Value:
@@ -99,6 +142,30 @@ def stability(scene: Scene, seed: Value) -> Value:
     return Value(found.moment_rate, found, system)
 
 
+def infinite_slope(scene: Scene, seed: Value) -> Value:
+    """Dgamma/ds where M = 0; the seed is a folded state.
+
+    Gamma less pi is odd in M along the path, by the mirror image of a ring that is turned back.
+    Past this boundary the path crosses pi three times, at rest the second time only.
+    """
+    system, near = carried(scene, seed)
+    found = _root(system, near, lambda at: at.moment)
+    return Value(found.tangent.gamma, found, system)
+
+
+def steepening(seed: Value) -> float:
+    """Third derivative of gamma along the path at a folded state, where the second is none.
+
+    Differences of the first over two distances, extrapolated: to the fourth power of them.
+    """
+    here = seed.at.tangent.gamma
+    wide, narrow = (
+        2.0 * (_moved(seed.system, seed.at, s).tangent.gamma - here) / s**2
+        for s in (BULGE, 0.5 * BULGE)
+    )
+    return (4.0 * narrow - wide) / 3.0
+
+
 def foldability(scene: Scene, seed: Value) -> Value:
     """Gamma less pi at a fold; the seed is one."""
     system, near = carried(scene, seed)
@@ -111,6 +178,41 @@ def snap_back(scene: Scene, seed: Value) -> Value:
     system, near = carried(scene, seed)
     bend = _root(system, near, lambda at: _bend(system, at))
     return Value(bend.tangent.gamma, bend, system)
+
+
+def exchange(scene: Scene, seed: Value) -> Value:
+    """How far two branches of equilibria are from meeting; the seed lies between them."""
+    system, mesh = _scaled(scene, seed)
+    return _exchanged(system, mesh, seed.at.frames, seed)
+
+
+def _exchanged(system: Collocation, mesh: Mesh, frames: Array, seed: Value) -> Value:
+    """The centre of an exchange, from frames on this mesh."""
+    found = centre(system, mesh, frames, np.append(seed.at.p, seed.at.gamma), seed.psi)
+    if found is None:
+        raise Lost("no two branches nearby")
+    return Value(found.mu, _state(system, mesh, found), system, found.psi)
+
+
+def _state(system: Collocation, mesh: Mesh, found: Centre) -> Solution:
+    """The centre of an exchange as a solution, which has no tangent."""
+    at, p, gamma = found.shot, found.x[:-1], float(found.x[-1])
+    moment, energy = observe(system.rule, system.sector.piece, mesh.h, mesh.rest, at.frames, p)
+    none = Direction(np.zeros_like(at.frames), np.zeros_like(p), 0.0)
+    energy *= system.sector.copies
+    return Solution(mesh, at.frames, p, gamma, moment, energy, none, 0.0, 0, at.nodes, at.places, 0)
+
+
+def closeness(system: Collocation, at: Solution) -> tuple[float, Array]:
+    """How near a state is to an exchange, and its psi.
+
+    The smallest singular value of the derivatives of the conditions at the end over the largest.
+    """
+    found = shot(system, at.mesh, at.frames, np.append(at.p, at.gamma))
+    if not found.ok:
+        return math.inf, np.zeros_like(at.p)
+    left, values, _ = np.linalg.svd(found.rates)
+    return float(values[-1] / values[0]), left[:, -1]
 
 
 def _moved(system: Collocation, at: Solution, s: float) -> Solution:
@@ -159,6 +261,8 @@ KINDS = {
     for name, condition in (
         ("stability", stability),
         ("foldability", foldability),
+        ("infinite slope", infinite_slope),
         ("snap-back", snap_back),
+        ("exchange", exchange),
     )
 }

@@ -44,7 +44,7 @@ class Curve:
 
     Attributes
     ----------
-    kind : "foldability", "stability" or "snap-back", with " (scan)" after it here
+    kind : "foldability", "stability", "snap-back", with " (scan)" after it here, or "exchange"
     twist_axis : of its rings; one with b = a is the same about both axes
     points : in order along the curve
     """
@@ -52,6 +52,22 @@ class Curve:
     kind: str
     twist_axis: str
     points: tuple[BoundaryPoint, ...]
+
+
+@dataclass(frozen=True)
+class Corner:
+    """Where two boundaries meet.
+
+    Attributes
+    ----------
+    kinds : of the two
+    twist_axis : of the ring
+    point : with gamma and moment of the first's state
+    """
+
+    kinds: tuple[str, str]
+    twist_axis: str
+    point: BoundaryPoint
 
 
 def scanned_boundaries(scan: Scan) -> list[Curve]:

@@ -14,18 +14,26 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path as File
 
 import numpy as np
 
 from der.files import FilePath, write_whole
-from validation.boundaries import boundaries
-from validation.cases import LABELS, PARAMETERS, Case, Row
-from validation.edges import Curve, scanned_boundaries
+from validation.boundaries import (
+    Boundaries,
+    boundaries,
+    joined,
+    slice_boundaries,
+    slices,
+)
+from validation.cases import LABELS, PARAMETERS, Case, Row, solve_case
+from validation.edges import Corner, Curve, scanned_boundaries
 from validation.families import FAMILIES, Family, family
 from validation.gauss import Array
+from validation.polygons import distance
 from validation.rod_check import Compared, Fold, rod_check, table
-from validation.scan import Scan, scan, solve_all
+from validation.scan import Scan, Solve, scan, solve_all
 from validation.store import Store
 from validation.workers import Workers
 from validation.workers import workers as started
@@ -44,6 +52,7 @@ class Diagram:
     ----------
     scan : its cases; `scan.sorted_rows` has each once
     curves : boundaries between folding modes
+    corners : where two of them meet
     compared : cases by the rod, too, where that was asked for
     files : what was written
     seconds : what it took: the scan, the boundaries, the check
@@ -51,6 +60,7 @@ class Diagram:
 
     scan: Scan
     curves: tuple[Curve, ...]
+    corners: tuple[Corner, ...]
     compared: tuple[Compared, ...]
     files: tuple[File, ...]
     seconds: tuple[float, float, float]
@@ -79,12 +89,13 @@ def phase(
     sample: int = SAMPLE,
     finest: int | None = None,
     progress: bool = True,
+    solve: Solve = solve_case,
 ) -> Diagram:
     """The phase diagram of a family of rings, written to a folder.
 
     Every finished case is in `cases.jsonl` at once, so that a run that ends in whatever way, and is
-    resumed, loses none but those in flight. Afterwards `cases.csv`, `boundaries.csv`, NAME.png, and
-    `check.csv` are written.
+    resumed, loses none but those in flight. Afterwards `cases.csv`, `boundaries.csv`,
+    `corners.csv`, NAME.png, and `check.csv` are written.
 
     Parameters
     ----------
@@ -99,6 +110,7 @@ def phase(
     sample : how many
     finest : intervals along each parameter at the finest level, a power of two
     progress : whether to show a bar, on a terminal
+    solve : the row of a case, see `scan`
 
     Raises
     ------
@@ -121,16 +133,17 @@ def phase(
             raise ValueError(
                 f"resume must be asked for in a folder that has cases, {folder} has {len(store)}"
             )
-        found = scan(wanted, store, crew, progress=progress)
+        found = scan(wanted, store, crew, solve=solve, progress=progress)
         clock.append(time.perf_counter())
         cases = _write(folder / "cases.csv", CASE_COLUMNS, map(_case_cells, found.sorted_rows))
-        curves = tuple(_boundaries(found, store, crew))
+        bounds = _boundaries(found, store, crew, solve)
+        beside = [row for row in store.rows.values() if wanted.unit(row.case) is not None]
     clock.append(time.perf_counter())
     compared = () if check is None else rod_check(found, check, sample)
     clock.append(time.perf_counter())
-    files = (cases, *_written(folder, found, curves, compared))
+    files = (cases, *_written(folder, found, bounds, compared, beside))
     seconds = (clock[1] - clock[0], clock[2] - clock[1], clock[3] - clock[2])
-    return Diagram(found, curves, compared, files, seconds)
+    return Diagram(found, tuple(bounds.curves), tuple(bounds.corners), compared, files, seconds)
 
 
 def run_phase(
@@ -146,6 +159,7 @@ def run_phase(
     sample: int = SAMPLE,
     finest: int | None = None,
     quiet: bool = False,
+    solve: Solve = solve_case,
 ) -> str:
     """`phase` for the command line: ranges as "b_over_a=0.7:1"; returns what there is to say."""
     diagram = phase(
@@ -160,6 +174,7 @@ def run_phase(
         sample=sample,
         finest=finest,
         progress=not quiet,
+        solve=solve,
     )
     return summary(diagram)
 
@@ -179,7 +194,8 @@ def summary(diagram: Diagram) -> str:
     if bad := [row for row in rows if not row.ok]:
         lines.append(f"  {len(bad):6d}  failed, the first: {bad[0].message}")
     kinds = Counter(curve.kind for curve in diagram.curves)
-    lines.append("boundaries: " + ", ".join(f"{n} {kind}" for kind, n in kinds.items()))
+    words = [f"{n} {kind}" for kind, n in kinds.items()]
+    lines.append(f"boundaries: {', '.join(words)}; {len(diagram.corners)} corners")
     if left := unexplained(diagram.scan, diagram.curves):
         lines.append(f"  {left} edges of the scan have no boundary within 1.5 cells")
     if diagram.compared:
@@ -210,16 +226,26 @@ def _made(folder: FilePath) -> File:
     return folder
 
 
-def _boundaries(found: Scan, store: Store, crew: Workers) -> list[Curve]:
-    """Boundaries followed in two parameters; what is solved for on the way is kept, too."""
+def _boundaries(found: Scan, store: Store, crew: Workers, solve: Solve) -> Boundaries:
+    """Boundaries followed in two parameters; what is solved for on the way is kept, too.
 
-    def solve(cases: Sequence[Case]) -> list[Row]:
-        solve_all(
-            [case for case in dict.fromkeys(cases) if case.key not in store.rows], store, crew
-        )
+    The slices of a cube are shared out whole.
+    """
+
+    def all_of(cases: Sequence[Case]) -> list[Row]:
+        new = [case for case in dict.fromkeys(cases) if case.key not in store.rows]
+        solve_all(new, store, crew, solve=solve)
         return [store.rows[case.key] for case in cases]
 
-    return boundaries(found.family, found.sorted_rows, solve=solve, side_by_side=crew.executor.map)
+    if found.family.dimension == 2:
+        return boundaries(found.family, found.sorted_rows, solve=all_of)
+    parts = slices(found.family, found.sorted_rows)
+    known = [[row for row in store.rows.values() if part.has(row.case)] for part in parts]
+    bounds = []
+    for one, rows in crew.executor.map(slice_boundaries, parts, known, repeat(solve)):
+        store.add(rows)
+        bounds.append(one)
+    return joined(bounds)
 
 
 def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
@@ -232,46 +258,45 @@ def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
         if len(known):
             lines.setdefault(curve.twist_axis, []).append(known)
     return sum(
-        _distance(np.array(place), lines.get(curve.twist_axis, [])) > 1.5 / family.finest
+        min(
+            (distance(np.array(place), line) for line in lines.get(curve.twist_axis, [])),
+            default=math.inf,
+        )
+        > 1.5 / family.finest
         for curve in scanned_boundaries(found)
         for point in curve.points
         if (place := family.unit(point.case)) is not None
     )
 
 
-def _distance(place: Array, lines: Iterable[Array]) -> float:
-    """Distance of a place from the nearest of some polygons."""
-    best = math.inf
-    for line in lines:
-        a, way = line[:-1], np.diff(line, axis=0)
-        if not len(way):
-            a, way = line, np.zeros_like(line)
-        square = np.maximum((way**2).sum(axis=1), 1e-300)
-        along = np.clip(((place - a) * way).sum(axis=1) / square, 0.0, 1.0)
-        apart = np.linalg.norm(a + along[:, None] * way - place, axis=1)
-        best = min(best, float(apart.min()))
-    return best
-
-
 # --- Files -----------------------------------------------------------------------------------
 
 
 def _written(
-    folder: File, found: Scan, curves: tuple[Curve, ...], compared: tuple[Compared, ...]
+    folder: File,
+    found: Scan,
+    bounds: Boundaries,
+    compared: tuple[Compared, ...],
+    beside: Sequence[Row],
 ) -> tuple[File, ...]:
+    """Write boundaries, check and picture; the table of cases has long been written."""
     from validation.phase_plot import save_diagram
 
-    """Write boundaries, check and picture; the table of cases has long been written."""
-    files = [_write(folder / "boundaries.csv", BOUNDARY_COLUMNS, _boundary_cells(curves))]
+    curves, corners = bounds
+    files = [
+        _write(folder / "boundaries.csv", BOUNDARY_COLUMNS, _boundary_cells(curves)),
+        _write(folder / "corners.csv", CORNER_COLUMNS, map(_corner_cells, corners)),
+    ]
     if compared:
         files.append(_write(folder / "check.csv", CHECK_COLUMNS, map(_check_cells, compared)))
-    files.append(save_diagram(found, curves, folder / f"{found.family.name}.png"))
+    files.append(save_diagram(found, curves, folder / f"{found.family.name}.png", beside))
     return tuple(files)
 
 
 MODE_COLUMNS = ("label", "foldable", "stable", "snapping", "moment", "slope", "folds", "error")
 CASE_COLUMNS = ("shape", "twist_axis", *PARAMETERS, *MODE_COLUMNS, "status", "message")
 BOUNDARY_COLUMNS = ("boundary", "twist_axis", *PARAMETERS, "gamma", "moment", "error", "curve")
+CORNER_COLUMNS = ("boundary", "other", "twist_axis", *PARAMETERS, "gamma", "moment", "error")
 CHECK_COLUMNS = (
     *("shape", "twist_axis", *PARAMETERS, "where", "agrees", "bvp", "rod"),
     *("moment_bvp", "moment_rod", "slope_bvp", "slope_rod", "message"),
@@ -291,6 +316,12 @@ def _boundary_cells(curves: Iterable[Curve]) -> Iterable[list[str]]:
         for point in curve.points:
             numbers = map(_number, (point.gamma, point.moment, point.error))
             yield [curve.kind, curve.twist_axis, *_values(point.case), *numbers, str(n)]
+
+
+def _corner_cells(corner: Corner) -> list[str]:
+    point = corner.point
+    numbers = map(_number, (point.gamma, point.moment, point.error))
+    return [*corner.kinds, corner.twist_axis, *_values(point.case), *numbers]
 
 
 def _check_cells(pair: Compared) -> list[str]:

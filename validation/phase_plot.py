@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path as File
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from der.files import FilePath
-from validation.cases import FAILED, LABELS, Case
+from validation.cases import FAILED, LABELS, Case, Row
 from validation.edges import Curve, planes
 from validation.families import Family, widest_fillet
 from validation.figures import canvas
@@ -27,12 +27,14 @@ LINES = {  # of boundaries, by kind
     "foldability": {"linestyle": "-", "linewidth": 1.5},
     "stability": {"linestyle": (0, (4, 1.6)), "linewidth": 1.3},
     "snap-back": {"linestyle": (0, (1, 1.3)), "linewidth": 1.5},
+    "infinite slope": {"linestyle": (0, (7, 1.2)), "linewidth": 1.5},
     "exchange": {"linestyle": (0, (8, 1.5, 1, 1.5)), "linewidth": 1.5},
 }
 OTHER = {"linestyle": "-.", "linewidth": 1.0}
 MEANINGS = {
     "foldability": "foldability (fold at $\\pi$)",
-    "exchange": "foldability (paths exchange)",
+    "infinite slope": "foldability (infinite slope at $\\pi$)",
+    "exchange": "paths exchange",
     "snap-back": "snap-back (cusp)",
 }
 SYMBOLS = {"circle": "o", "ellipse": "s", "rectangle": "s", "triangle": "^"}
@@ -44,17 +46,25 @@ WORDS = {
     "h_over_t": "$h/t$",
 }
 LINE = 0.167  # of the legend, inches
-FINER = 4  # pixels between two nodes
+FINER = 4  # pixels between two nodes, at least,
+PIXELS = 512  # and at least so many across
 
 
-def save_diagram(scan: Scan, curves: Iterable[Curve], file: FilePath) -> File:
-    """Draw a phase diagram: one panel in two dimensions, slices in three; return the file."""
-    curves = list(curves)
+def save_diagram(
+    scan: Scan, curves: Iterable[Curve], file: FilePath, beside: Iterable[Row] = ()
+) -> File:
+    """Draw a phase diagram: one panel in two dimensions, slices in three; return the file.
+
+    Parameters
+    ----------
+    beside : rows of other cases than the scan's, such as those solved on the sides of its curves
+    """
+    curves, beside = list(curves), list(beside)
     draw = _flat if scan.family.dimension == 2 else _slices
-    return canvas.save(draw(scan, curves), file)
+    return canvas.save(draw(scan, curves, beside), file)
 
 
-def _flat(scan: Scan, curves: Sequence[Curve]) -> canvas.Figure:
+def _flat(scan: Scan, curves: Sequence[Curve], beside: Sequence[Row]) -> canvas.Figure:
     """The picture of a diagram of two parameters."""
     family = scan.family
     marks = [case for case in family.marks if family.unit(case) is not None]
@@ -64,17 +74,17 @@ def _flat(scan: Scan, curves: Sequence[Curve]) -> canvas.Figure:
     above = 0.62 if len(family.sheets) == 2 else 0.42
     high = foot + 3.3 + above
     figure = canvas.page(wide, high)
-    panel = figure.add_axes((0.56 / wide, foot / high, 1.0 - 0.76 / wide, 3.3 / high))
-    _fill(panel, scan, None, curves, marks)
+    panel = figure.add_axes((0.62 / wide, foot / high, 1.0 - 0.82 / wide, 3.3 / high))
+    _fill(panel, scan, None, curves, beside, marks)
     _dress(panel, family)
     panel.set_xlabel(WORDS[family.parameters[0]], fontsize=10, color=canvas.INK)
     panel.set_ylabel(WORDS[family.parameters[-1]], fontsize=10, color=canvas.INK)
-    _head(figure, family, 0.56 / wide, 1 - 0.19 / high)
+    _head(figure, family, 0.62 / wide, 1 - 0.19 / high)
     _show_legend(figure, legend, columns)
     return figure
 
 
-def _slices(scan: Scan, curves: Sequence[Curve]) -> canvas.Figure:
+def _slices(scan: Scan, curves: Sequence[Curve], beside: Sequence[Row]) -> canvas.Figure:
     """The picture of a diagram of three parameters: slices at parts of the second's range."""
     family = scan.family
     cut = list(planes(family))
@@ -98,7 +108,8 @@ def _slices(scan: Scan, curves: Sequence[Curve]) -> canvas.Figure:
         here = [curve for curve in curves if _in_slice(family, curve, k)]
         marks = [case for case in family.marks if _at(family, case, k)]
         shown += marks
-        _fill(panel, scan, k, here, marks)
+        near = [row for row in beside if _at(family, row.case, k)]
+        _fill(panel, scan, k, here, near, marks)
         _dress(panel, family, small=True)
         title = 0.175 if len(family.sheets) == 2 else 0.04
         place = panel.get_window_extent().height / canvas.DPI
@@ -148,7 +159,12 @@ def _in_slice(family: Family, curve: Curve, k: int) -> bool:
 
 
 def _fill(
-    panel: Any, scan: Scan, k: int | None, curves: Sequence[Curve], marks: Sequence[Case]
+    panel: Any,
+    scan: Scan,
+    k: int | None,
+    curves: Sequence[Curve],
+    beside: Sequence[Row],
+    marks: Sequence[Case],
 ) -> None:
     """Draw regions, boundaries and marked cases; k: those in this plane of the lattice."""
     from matplotlib.colors import ListedColormap
@@ -158,7 +174,9 @@ def _fill(
     for sheet in family.sheets:
         sides = (low, high) if sheet == family.sheets[0] else (2.0 * high - low, high)
         panel.imshow(
-            _regions(scan, sheet, k, _segments(family, sheet, curves)).T,
+            _regions(
+                scan, sheet, k, _segments(family, sheet, curves), _others(family, sheet, beside)
+            ).T,
             extent=(*sides, *family.ranges[-1]),
             cmap=ListedColormap(COLOURS),
             vmin=-0.5,
@@ -174,17 +192,30 @@ def _fill(
         panel.plot(*here, **_symbol(case, family), clip_on=False, zorder=6)
 
 
-def _regions(scan: Scan, sheet: str, k: int | None, segments: Array) -> Labels:
+class Others(NamedTuple):
+    """Cases beside the nodes of a plane."""
+
+    places: Array  # (m, 2) in units of the lattice
+    labels: Labels  # (m,)
+
+
+NONE = Others(np.empty((0, 2)), np.empty(0, dtype=np.int64))
+
+
+def _regions(
+    scan: Scan, sheet: str, k: int | None, segments: Array, others: Others = NONE
+) -> Labels:
     """Number of the label at fine places between the nodes of a plane.
 
     Where a boundary passes (segments, (m, 2, 2), in units of the lattice), it is that of the
-    nearest node on the same side; elsewhere,
-    whether a ring can be folded and snaps back is what most of the neighbours do, weighted by
-    distance; whether it is stable is the sign of the slope at pi, interpolated.
+    nearest case on the same side; elsewhere, whether a ring can be folded and snaps back is what
+    most of the neighbours do, weighted by distance; whether it is stable is the sign of the slope
+    at pi, interpolated.
     """
     labels, slopes = _nodes(scan, sheet, k)
     n = len(labels)
-    place = (np.arange(FINER * (n - 1)) + 0.5) / FINER
+    finer = max(FINER, PIXELS // (n - 1))
+    place = (np.arange(finer * (n - 1)) + 0.5) / finer
     weight = np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(n)))
 
     def mean(values: Array | NDArray[np.bool_]) -> Array:
@@ -200,8 +231,19 @@ def _regions(scan: Scan, sheet: str, k: int | None, segments: Array) -> Labels:
     winner = np.argmax(parts, axis=0)
     found[winner == 0] = 0
     found[winner == 2] = NAMES.index(FAILED)
-    _take_sides(found, labels, segments)
+    _take_sides(found, labels, segments, others)
     return found
+
+
+def _others(family: Family, sheet: str, rows: Iterable[Row]) -> Others:
+    """Solved cases of a sheet."""
+    places, labels = [], []
+    for row in rows:
+        unit = family.unit(row.case)
+        if row.ok and unit is not None and (row.case.twist_axis == sheet or unit[0] == 1.0):
+            places.append((unit[0] * family.finest, unit[-1] * family.finest))
+            labels.append(NAMES.index(row.label))
+    return Others(np.array(places).reshape(-1, 2), np.array(labels, dtype=np.int64))
 
 
 def _segments(family: Family, sheet: str, curves: Iterable[Curve]) -> Array:
@@ -215,25 +257,32 @@ def _segments(family: Family, sheet: str, curves: Iterable[Curve]) -> Array:
     return np.concatenate(pieces)
 
 
-def _take_sides(found: Labels, labels: Labels, segments: Array) -> None:
-    """Between nodes that differ, put right what lies on the other side of a boundary."""
+def _take_sides(found: Labels, labels: Labels, segments: Array, others: Others) -> None:
+    """Where labels differ within a cell, put right what lies on the other side of a boundary."""
+    finer = len(found) // (len(labels) - 1)
     low, high = segments.min(axis=1), segments.max(axis=1)
-    inner = (np.arange(FINER) + 0.5) / FINER
+    inner = (np.arange(finer) + 0.5) / finer
     offsets = np.stack(np.meshgrid(inner, inner, indexing="ij"), axis=-1).reshape(-1, 2)
     steps = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
     around = [labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]]
-    for i, j in np.argwhere(np.ptp(around, axis=0) > 0):
+    mixed = np.ptp(around, axis=0) > 0
+    homes = np.clip(others.places.astype(np.int64), 0, len(labels) - 2)
+    mixed[tuple(homes[others.labels != around[0][tuple(homes.T)]].T)] = True
+    for i, j in np.argwhere(mixed):
         near = ((low <= (i + 1, j + 1)) & (high >= (i, j))).all(axis=1)
         if not near.any():
             continue
         here = np.array((i, j))
-        places, nodes = here + offsets, here + steps
-        far = np.linalg.norm(places[:, None] - nodes, axis=2)
-        far[_crossed(places, nodes, segments[near])] = np.inf
-        best = np.argmin(far, axis=1)
-        chosen = labels[nodes[best, 0], nodes[best, 1]]
-        block = found[i * FINER : (i + 1) * FINER, j * FINER : (j + 1) * FINER]
-        block[...] = np.where(np.isinf(far.min(axis=1)), block.ravel(), chosen).reshape(block.shape)
+        own = (homes == here).all(axis=1)
+        cases = np.concatenate([here + steps, others.places[own]])
+        names = np.concatenate([labels[tuple((here + steps).T)], others.labels[own]])
+        places = here + offsets
+        far = np.linalg.norm(places[:, None] - cases, axis=2)
+        far[_crossed(places, cases, segments[near])] = np.inf
+        block = found[i * finer : (i + 1) * finer, j * finer : (j + 1) * finer]
+        kept = np.isinf(far.min(axis=1))
+        chosen = np.where(kept, block.ravel(), names[np.argmin(far, axis=1)])
+        block[...] = chosen.reshape(block.shape)
 
 
 def _crossed(places: Array, nodes: Array, segments: Array) -> NDArray[np.bool_]:

@@ -107,9 +107,14 @@ def _half(
     step = 0.25 * LARGEST
     while len(found) < MOST and step >= SMALLEST:
         u = here.u + step * tangent
-        outside = bool(((u < 0.0) | (u > 1.0)).any())
+        if _outside(u):
+            if end := _at_edge(f, here, u):
+                found.append(end)
+                return found, False
+            step *= 0.5
+            continue
         try:
-            new = corrected(f, np.clip(u, -0.02, 1.02), here.state, near=0.7 * step)
+            new = corrected(f, u, here.state, near=0.7 * step)
         except Lost:
             step *= 0.5
             continue
@@ -120,8 +125,8 @@ def _half(
         if angle > SHARPEST or (new.u - here.u) @ tangent <= 0.0:
             step *= 0.5
             continue
-        if outside or ((new.u < 0.0) | (new.u > 1.0)).any():
-            if end := _at_edge(f, here, new):
+        if _outside(new.u):
+            if end := _at_edge(f, here, new.u):
                 found.append(end)
             return found, False
         found.append(new)
@@ -132,9 +137,17 @@ def _half(
     return found, False
 
 
-def _at_edge(f: Function[T], inside: At[T], outside: At[T]) -> At[T] | None:
-    """The point of the curve on the edge of the square that it crosses first."""
-    way = outside.u - inside.u
+def _outside(u: Array) -> bool:
+    """Whether a place is not in the square."""
+    return bool(((u < 0.0) | (u > 1.0)).any())
+
+
+def _at_edge(f: Function[T], inside: At[T], outside: Array) -> At[T] | None:
+    """The point of the curve on the edge of the square that it crosses first on its way out.
+
+    None where there is none so near as it should be.
+    """
+    way = outside - inside.u
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = np.where(way > 0.0, (1.0 - inside.u) / way, -inside.u / way)
     reach[way == 0.0] = np.inf
@@ -144,12 +157,13 @@ def _at_edge(f: Function[T], inside: At[T], outside: At[T]) -> At[T] | None:
     other = 1 - k
     u = inside.u + reach[k] * way
     u[k] = round(float(u[k]))
-    state, h = inside.state, 1e-4
+    start, farthest = u[other], float(np.linalg.norm(way))
+    state, h = inside.state, 1e-4 if u[other] < 0.5 else -1e-4
     try:
         value, state = f(u, state)
         for _ in range(12):
             if abs(h) < EXACT:
-                return At(u, state, abs(h), outside.gradient)
+                return At(u, state, abs(h), _gradient(f, u, value, state))
             ahead = u.copy()
             ahead[other] += h
             after, state = f(ahead, state)
@@ -157,6 +171,8 @@ def _at_edge(f: Function[T], inside: At[T], outside: At[T]) -> At[T] | None:
                 break
             h = -after * h / (after - value)
             u, value = ahead, after
+            if not abs(u[other] + h - start) <= farthest or _outside(u):
+                break
     except Lost:
         pass
     return None

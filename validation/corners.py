@@ -1,0 +1,226 @@
+"""Corners of a phase diagram: where two boundaries meet, solved for with the conditions of both.
+
+Boundaries of unlike things cross, and their polygons say where to begin. The curve of the fold at
+pi touches others instead, where they have a state of which one more thing is true: those of
+exchanges and cusps where their gamma is pi, that of the infinite slope where gamma = pi is crossed
+to the fifth order. That is the second condition then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from validation.conditions import Lost, Value, on, steepening
+from validation.gauss import Array
+from validation.polygons import meetings, nearest
+from validation.tracing import DIFFERENCE, EXACT, At, Function, corrected
+
+FOLD = "foldability"
+
+
+def _gamma(state: Value) -> float:
+    """Gamma less pi."""
+    return state.at.gamma - math.pi
+
+
+TOUCHING = {  # what touches the fold at pi, and where
+    "exchange": _gamma,
+    "snap-back": _gamma,
+    "infinite slope": steepening,
+}
+ORDER = (*TOUCHING, "stability", FOLD)  # the first's state is the one that a corner tells of
+NEAR = 0.1  # of the square's side: a corner lies so near to its bracket
+BESIDE = 0.02  # of the side: a curve that ends so near to a corner on it ends there
+SAME = 1e-6  # of the side: two corners so near are one
+DIFFERENT = 0.05  # gamma and M of states that are not the same, together
+MOST = 20
+
+ConditionOf = Callable[[str], Function[Value]]
+
+
+@dataclass(frozen=True, eq=False)
+class Met:
+    """A corner of a diagram; no two are equal.
+
+    Attributes
+    ----------
+    kinds : of the boundaries that meet
+    first, second : the corner as a point of each, with its state; the same state where they touch
+    error : of its place, of the square's side
+    """
+
+    kinds: tuple[str, str]
+    first: At[Value]
+    second: At[Value]
+    error: float
+
+
+@dataclass
+class Line:
+    """A curve on its way to a boundary: its points, and the corners that some of them are."""
+
+    kind: str
+    points: list[At[Value]]
+    corners: list[Met | None]
+
+    @property
+    def places(self) -> Array:
+        """(n, 2) in the unit square."""
+        return np.array([at.u for at in self.points])
+
+    def insert(self, k: int, at: At[Value], corner: Met | None) -> None:
+        """Make a point the k-th."""
+        self.points.insert(k, at)
+        self.corners.insert(k, corner)
+
+
+def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
+    """Solve for all corners, and put each among the points of its curves."""
+    found: list[Met] = []
+    for one, other in combinations(sorted(lines, key=lambda line: ORDER.index(line.kind)), 2):
+        if one.kind == other.kind:
+            continue
+        for u in [meeting.place for meeting in meetings(one.places, other.places)]:
+            (i, _), (j, _) = nearest(u, one.places), nearest(u, other.places)
+            seeds = one.points[i].state, other.points[j].state
+            if _same(*seeds):  # they touch, or are one: polygons cross there by chance
+                continue
+            try:
+                met = _solved((one.kind, other.kind), u, seeds, condition, touching=False)
+            except Lost:
+                continue
+            met = _once(met, found)
+            _put(one, met.first, met)
+            _put(other, met.second, met)
+    for line in [line for line in lines if line.kind in TOUCHING]:
+        for k in _touching(line):
+            u = 0.5 * (line.points[k].u + line.points[k + 1].u)
+            try:
+                met = _solved(
+                    (line.kind, FOLD), u, (line.points[k].state,) * 2, condition, touching=True
+                )
+            except Lost:
+                continue
+            met = _once(met, found)
+            _put(line, met.first, met)
+            for fold in [other for other in lines if other.kind == FOLD]:
+                if nearest(met.first.u, fold.places)[1] < BESIDE:
+                    _put(fold, met.second, met)
+                    _end(fold, met)
+    for line in lines:
+        _separate(line, condition(line.kind))
+    return found
+
+
+def _once(met: Met, found: list[Met]) -> Met:
+    """A corner, or the one already found in its place, on a curve that was followed twice."""
+    for old in found:
+        if old.kinds == met.kinds and np.linalg.norm(old.first.u - met.first.u) < SAME:
+            return old
+    found.append(met)
+    return met
+
+
+def _separate(line: Line, condition: Function[Value]) -> None:
+    """See to it that between any two corners on a curve there is a point that is none."""
+    for k in range(len(line.points) - 2, -1, -1):
+        if line.corners[k] is not None and line.corners[k + 1] is not None:
+            a, b = line.points[k], line.points[k + 1]
+            try:
+                between = corrected(condition, 0.5 * (a.u + b.u), a.state)
+            except Lost:
+                continue
+            line.insert(k + 1, between, None)
+
+
+def _touching(line: Line) -> list[int]:
+    """After which points of a curve it touches that of the fold at pi, the last one first."""
+    values = []
+    for at in line.points:
+        try:
+            values.append(TOUCHING[line.kind](at.state))
+        except Lost:
+            values.append(math.nan)
+    return [k for k in range(len(values) - 2, -1, -1) if values[k] * values[k + 1] < 0.0]
+
+
+def _same(one: Value, other: Value) -> bool:
+    """Whether two states of a ring are about the same."""
+    return abs(one.at.gamma - other.at.gamma) + abs(one.at.moment - other.at.moment) < DIFFERENT
+
+
+def _put(line: Line, at: At[Value], corner: Met) -> None:
+    """Insert a corner where the curve comes nearest to it, beyond its end if it ends before."""
+    if corner in line.corners:
+        return
+    places = line.places
+    k, _ = nearest(at.u, places)
+    along = 1.0
+    if len(places) > 1:
+        way = places[k + 1] - places[k]
+        along = float((at.u - places[k]) @ way) / float(way @ way)
+    line.insert(k if k == 0 and along < 0.0 else k + 1 + (along > 1.0), at, corner)
+
+
+def _end(line: Line, corner: Met) -> None:
+    """End the curve of a fold at a corner from where it goes back, or where the fold is gone."""
+    k, places = line.corners.index(corner), line.places
+    if not 0 < k < len(places) - 1:
+        return
+    back = (places[k] - places[k - 1]) @ (places[k + 1] - places[k]) < 0.0
+    if back or corner.kinds[0] == "infinite slope":
+        rest = slice(k + 1) if 2 * k >= len(places) else slice(k, None)
+        line.points, line.corners = line.points[rest], line.corners[rest]
+
+
+def _solved(
+    kinds: tuple[str, str],
+    u: Array,
+    seeds: tuple[Value, Value],
+    condition: ConditionOf,
+    *,
+    touching: bool,
+) -> Met:
+    """Both conditions' root near ``u`` (Newton's method, Broyden's update of the derivatives)."""
+    one = condition(kinds[0])
+
+    def both(u: Array, seeds: tuple[Value, Value]) -> tuple[Array, tuple[Value, Value]]:
+        f, first = one(u, seeds[0])
+        if touching:
+            return np.array([f, TOUCHING[kinds[0]](first)]), (first, first)
+        g, second = condition(kinds[1])(u, seeds[1])
+        return np.array([f, g]), (first, second)
+
+    start = u
+    values, seeds = both(u, seeds)
+    rates = np.empty((2, 2))
+    for k in range(2):
+        step = np.zeros(2)
+        step[k] = DIFFERENCE if u[k] < 0.5 else -DIFFERENCE
+        rates[:, k] = (both(u + step, seeds)[0] - values) / step[k]
+    for _ in range(MOST):
+        change = np.linalg.lstsq(rates, -values, rcond=None)[0]
+        size = float(np.linalg.norm(change))
+        if size < EXACT:
+            break
+        u = u + change
+        if not np.linalg.norm(u - start) < NEAR:
+            raise Lost("no corner nearby")
+        before = values
+        values, seeds = both(u, seeds)
+        rates += np.outer(values - before - rates @ change, change) / size**2
+    else:
+        raise Lost("no corner found")
+    if ((u < -EXACT) | (u > 1.0 + EXACT)).any():
+        raise Lost("the corner is outside")
+    u = np.clip(u, 0.0, 1.0)
+    first, second = (At(u, seed, size, rate) for seed, rate in zip(seeds, rates, strict=True))
+    one_fine, other_fine = (on(seed.at.mesh.halved, seed) for seed in seeds)
+    fine, _ = both(u, (one_fine, other_fine))
+    apart = np.linalg.lstsq(rates, fine - values, rcond=None)[0]
+    return Met(kinds, first, second, size + float(np.linalg.norm(apart)))
