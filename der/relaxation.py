@@ -36,6 +36,7 @@ _HEAVIER = 1.5  # factor on the masses of a rod that has gained energy
 _GAIN = 1e-9  # of the energy: less is rounding and the second order of the conditions
 _CLOSED = 1e-6  # a; a larger gap is closed before the motion starts
 _PROJECTIONS = 20
+_SLOTS = 2048  # of the album: a longer film is thinned out
 
 
 class Rest(IntEnum):
@@ -70,7 +71,7 @@ class Aim(NamedTuple):
 
 
 class Album(NamedTuple):
-    """Every k-th configuration of a relaxation; kernels write to it."""
+    """Every k-th configuration of a relaxation, of a long one fewer; kernels write to it."""
 
     quat: Array  # (slots, n, 4)
     stretch: Array  # (slots, n)
@@ -249,6 +250,18 @@ def _keep(motion, energy, slot, out_album):
 
 
 @njit(cache=True)
+def _thin(out_album):
+    """Keep every second configuration; returns how many."""
+    kept = (out_album.load.shape[0] + 1) // 2
+    for k in range(1, kept):
+        out_album.quat[k] = out_album.quat[2 * k]
+        out_album.stretch[k] = out_album.stretch[2 * k]
+        out_album.load[k] = out_album.load[2 * k]
+        out_album.energy[k] = out_album.energy[2 * k]
+    return kept
+
+
+@njit(cache=True)
 def _potential(energy, aim, motion, pull):
     """What a motion spends: energy less the work of dead loads; gaps count to first order."""
     potential = energy - pull.work[0] - aim.moment * motion.load[0]
@@ -262,6 +275,7 @@ def _relax(rod, held, aim, motion, pull, masses, album):
     """Motion with kinetic damping until it ends; writes to all that follows ``aim``."""
     heaviness, kinetic, at_rest = 0.5 * _MARGIN, 0.0, 0.0
     count, restarts, kept, first, start = 0, 0, 0, 0.0, 0.0
+    every = aim.every
     weigh(rod, held, motion, heaviness, aim.frees_load, masses)
     _close(rod, held, masses, pull, motion)
     while True:
@@ -269,9 +283,12 @@ def _relax(rod, held, aim, motion, pull, masses, album):
         residual = _balance(held, masses, aim, pull)
         if count == 0:
             first, start = residual, energy
-        if aim.every > 0 and count % aim.every == 0 and kept < album.load.shape[0]:
-            _keep(motion, energy, kept, album)
-            kept += 1
+        if every > 0 and count % every == 0:
+            if kept == album.load.shape[0]:
+                kept, every = _thin(album), 2 * every
+            if count % every == 0:
+                _keep(motion, energy, kept, album)
+                kept += 1
         count += 1
         outcome = _verdict(aim, residual, first, kinetic, motion.load[0], bent_too_far, count)
         if outcome >= 0:
@@ -331,7 +348,8 @@ def relax(
     stops : loads at which a motion under dead moment ends.
     tolerance : of the residual, GJ/a; the kinetic energy has to be below its square.
     most : gradients to be evaluated at most.
-    every : keep every k-th configuration in `Relaxed.history`; 0: none.
+    every : keep every k-th configuration in `Relaxed.history`; 0: none. Where that gets long, every
+        2k-th, 4k-th, ..., so that there are never more than 2,048.
 
     Raises
     ------
@@ -352,7 +370,7 @@ def relax(
     n, b = held.free.shape
     motion, pull = _at_rest(held, start), no_pull(held)
     masses = Masses(np.zeros((n, b, b)), np.zeros((n, b, b)), np.zeros(1))
-    slots = most // every + 1 if every > 0 else 0
+    slots = min(most // every + 1, _SLOTS) if every > 0 else 0
     album = Album(np.empty((slots, n, 4)), np.empty((slots, n)), np.empty(slots), np.empty(slots))
     free = moment is not None
     aim = Aim(free, 0.0 if moment is None else moment, *stops, tolerance, most, every)

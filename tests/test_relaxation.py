@@ -1,5 +1,7 @@
 """Dynamic relaxation: forces without a Hessian, and rest where Newton's method finds it."""
 
+import math
+
 import numpy as np
 import pytest
 from rods import E1, E3, MEASURES, solved, straight, unloaded
@@ -105,6 +107,20 @@ def test_energy_only_falls():
     assert end.energies.max() <= end.energies[0] * (1.0 + 1e-12)
     assert end.energy < end.energy_start
     assert end.restarts > 3
+
+
+def test_a_long_film_is_thinned_out(monkeypatch):
+    """It has every k-th, then every 2k-th, ... of the configurations, the first one always."""
+    piece = circle()
+    start = turned_on(piece, 1.0, 0.05)
+    whole = relax(piece.body, piece.held, start, every=1)
+    monkeypatch.setattr("der.relaxation._SLOTS", 50)
+    thin = relax(piece.body, piece.held, start, every=1)
+    stride = 2 ** math.ceil(math.log2(len(whole.history) / 50))
+    assert stride > 2
+    np.testing.assert_array_equal(thin.energies, whole.energies[::stride])
+    for few, many in zip(thin.history, whole.history[::stride], strict=True):
+        np.testing.assert_array_equal(few.quat, many.quat)
 
 
 @pytest.mark.parametrize("name", ["quarter", "full"])
