@@ -250,19 +250,25 @@ def take_out(free, diag, off, border):
 
     A held unknown's row and column are those of the identity: it stays put and counts as positive.
     """
-    n, b = free.shape
     diag, off, border = diag.copy(), off.copy(), border.copy()
+    hold(free, diag, off, border)
+    return diag, off, border
+
+
+@njit(cache=True)
+def hold(free, out_diag, out_off, out_border):
+    """`take_out` in place."""
+    n, b = free.shape
     for j in range(n):
         for i in range(b):
             if free[j, i]:
                 continue
             for k in range(b):
-                diag[j, i, k] = 0.0
-                diag[j, k, i] = 0.0
-                off[j, i, k] = 0.0
+                out_diag[j, i, k] = 0.0
+                out_diag[j, k, i] = 0.0
+                out_off[j, i, k] = 0.0
                 if j > 0:
-                    off[j - 1, k, i] = 0.0
-            diag[j, i, i] = 1.0
-            for k in range(border.shape[2]):
-                border[j, i, k] = 0.0
-    return diag, off, border
+                    out_off[j - 1, k, i] = 0.0
+            out_diag[j, i, i] = 1.0
+            for k in range(out_border.shape[2]):
+                out_border[j, i, k] = 0.0

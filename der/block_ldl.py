@@ -29,7 +29,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from der.dense import invert, solve_dense
+from der.dense import invert, invert_three, solve_dense
 
 MAX_DELAYED = 8
 
@@ -51,6 +51,54 @@ class Factors(NamedTuple):
 
 
 @njit(cache=True)
+def _own_stiffness(diag, off, out_size):
+    """Diagonal entries (n, b), in size, or what stands in for them; returns the largest entry.
+
+    That is the largest entry of its row where an unknown has next to no stiffness of its own.
+    """
+    n, b = out_size.shape
+    whole = 1e-300
+    for j in range(n):
+        for k in range(b):
+            own = abs(diag[j, k, k])
+            around = own  # stretch may be stiffer by far than bending
+            for i in range(b):
+                around = max(around, abs(diag[j, k, i]))
+                if j < n - 1:
+                    around = max(around, abs(off[j, k, i]))
+                if j > 0:
+                    around = max(around, abs(off[j - 1, i, k]))
+            out_size[j, k] = own if own > _NO_STIFFNESS * around else around
+            whole = max(whole, around)
+    return whole
+
+
+@njit(cache=True, inline="always")
+def _reduce(b, j, diag, off, inverse, unit, out_lower, out_pivot):
+    """The block of L before pivot ``j``, and this pivot (b, b) in the units of its unknowns."""
+    for k in range(b):
+        for i in range(b):
+            out_pivot[k, i] = diag[j, k, i]
+    if j > 0:
+        for k in range(b):
+            for i in range(b):
+                s = 0.0
+                for r in range(b):
+                    s += off[j - 1, r, k] * inverse[j - 1, r, i]
+                out_lower[j, k, i] = s
+        for k in range(b):
+            for i in range(k + 1):
+                s = out_pivot[k, i]
+                for r in range(b):
+                    s -= out_lower[j, k, r] * off[j - 1, r, i]
+                out_pivot[k, i] = s
+                out_pivot[i, k] = s
+    for k in range(b):
+        for i in range(b):
+            out_pivot[k, i] *= unit[k] * unit[i]
+
+
+@njit(cache=True)
 def factor(diag, off, border):
     """Factor K; see `Factors`. ``negative`` is -1 where too many pivots had to be delayed.
 
@@ -68,55 +116,28 @@ def factor(diag, off, border):
     pivot = np.empty((b, b))
     count = 0
     negative = 0
-    unit = np.empty(b)  # square root of an unknown's own stiffness: pivots are judged by it
-    whole = 1e-300
+    size = np.empty((n, b))  # an unknown's own stiffness: pivots are judged by it
+    whole = _own_stiffness(diag, off, size)
+    unit = np.empty(b)  # its inverse square root
     for j in range(n):
         for k in range(b):
-            whole = max(whole, abs(diag[j, k, k]))
-            for i in range(b):
-                if j < n - 1:
-                    whole = max(whole, abs(off[j, k, i]))
-    for j in range(n):
-        for k in range(b):
-            for i in range(b):
-                pivot[k, i] = diag[j, k, i]
-            own = abs(diag[j, k, k])
-            around = 0.0  # the largest entry of its row: stretch may be stiffer by far than bending
-            for i in range(b):
-                around = max(around, abs(diag[j, k, i]))
-                if j < n - 1:
-                    around = max(around, abs(off[j, k, i]))
-                if j > 0:
-                    around = max(around, abs(off[j - 1, i, k]))
-            if around <= _NOTHING * whole:
-                around = whole
-            unit[k] = np.sqrt(own if own > _NO_STIFFNESS * around else around)
-        if j > 0:
-            for k in range(b):
-                for i in range(b):
-                    s = 0.0
-                    for r in range(b):
-                        s += off[j - 1, r, k] * inverse[j - 1, r, i]
-                    lower[j, k, i] = s
-            for k in range(b):
-                for i in range(k + 1):
-                    s = pivot[k, i]
-                    for r in range(b):
-                        s -= lower[j, k, r] * off[j - 1, r, i]
-                    pivot[k, i] = s
-                    pivot[i, k] = s
-        for k in range(b):
-            for i in range(b):
-                pivot[k, i] /= unit[k] * unit[i]
-        minus, _ = invert(pivot, _DELAY_BELOW, delayed)
+            unit[k] = 1.0 / np.sqrt(size[j, k] if size[j, k] > _NOTHING * whole else whole)
+        if b == 3:  # a constant, so that loops are unrolled
+            _reduce(3, j, diag, off, inverse, unit, lower, pivot)
+            minus = invert_three(pivot, _DELAY_BELOW)
+        else:
+            _reduce(b, j, diag, off, inverse, unit, lower, pivot)
+            minus = -1
+        if minus < 0:
+            minus, _ = invert(pivot, _DELAY_BELOW, delayed)
         negative += minus
         for k in range(b):
             for i in range(b):
-                inverse[j, k, i] = -pivot[k, i] / (unit[k] * unit[i])
+                inverse[j, k, i] = -pivot[k, i] * (unit[k] * unit[i])
             if delayed[k] != 0.0:
                 if count < MAX_DELAYED:
                     where[count, 0], where[count, 1] = j, k
-                    added[count] = delayed[k] * unit[k] ** 2
+                    added[count] = delayed[k] / unit[k] ** 2
                 count += 1
                 delayed[k] = 0.0
     if count > MAX_DELAYED:
@@ -153,26 +174,36 @@ def factor(diag, off, border):
 @njit(cache=True)
 def solve_band(inverse, lower, x):
     """Replace ``x`` (n, b, r), r right-hand sides, by (T + delayed)^-1 x."""
-    n, b, r = x.shape
+    b = x.shape[1]
+    if b == 3:  # a constant, so that loops are unrolled
+        _sweep(3, inverse, lower, x)
+    else:
+        _sweep(b, inverse, lower, x)
+
+
+@njit(cache=True, inline="always")
+def _sweep(b, inverse, lower, x):
+    """`solve_band`, forward and back."""
+    n, _, r = x.shape
     y = np.empty((b, r))
     for j in range(1, n):
-        for k in range(b):
-            for i in range(b):
-                for c in range(r):
-                    x[j, k, c] -= lower[j, k, i] * x[j - 1, i, c]
-    for j in range(n - 1, -1, -1):
-        for k in range(b):
-            for c in range(r):
-                y[k, c] = 0.0
-            for i in range(b):
-                for c in range(r):
-                    y[k, c] += inverse[j, k, i] * x[j, i, c]
-            if j < n - 1:
+        for c in range(r):
+            for k in range(b):
+                s = x[j, k, c]
                 for i in range(b):
-                    for c in range(r):
-                        y[k, c] -= lower[j + 1, i, k] * x[j + 1, i, c]
-        for k in range(b):
-            for c in range(r):
+                    s -= lower[j, k, i] * x[j - 1, i, c]
+                x[j, k, c] = s
+    for j in range(n - 1, -1, -1):
+        for c in range(r):
+            for k in range(b):
+                s = 0.0
+                for i in range(b):
+                    s += inverse[j, k, i] * x[j, i, c]
+                if j < n - 1:
+                    for i in range(b):
+                        s -= lower[j + 1, i, k] * x[j + 1, i, c]
+                y[k, c] = s
+            for k in range(b):
                 x[j, k, c] = y[k, c]
 
 

@@ -148,9 +148,18 @@ def optional(check: Callable[[str, Any], T]) -> Callable[[str, Any], T | None]:
 
 def numbers(name: str, values: object) -> Array:
     """Return a read-only copy of a list or a one-dimensional array of finite numbers."""
-    array = np.array(each(name, values, checked_number), dtype=np.float64)
+    if _are_floats(values):
+        array = np.array(values)
+    else:
+        array = np.array(each(name, values, checked_number), dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def _are_floats(values: object) -> bool:
+    """Whether this is a plain one-dimensional array of finite floats: no need to look at each."""
+    plain = type(values) is np.ndarray and values.ndim == 1 and values.dtype == np.float64
+    return plain and bool(np.isfinite(values).all())  # type: ignore[call-overload]
 
 
 def counts(name: str, values: object) -> Counts:

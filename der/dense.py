@@ -89,6 +89,40 @@ def invert(A, delay_below, out_delayed):
 
 
 @njit(cache=True)
+def invert_three(A, smallest):
+    """`invert` of a matrix (3, 3) by formula, with its pivots in order, where they allow that.
+
+    Each pivot must be above ``smallest`` and, as by Bunch & Kaufman, no smaller against its column
+    than `invert` would take it, which bounds the growth alike.
+
+    Returns the number of negative pivots, or -1 with ``A`` as it was.
+    """
+    a, b, c = A[0, 0], A[1, 0], A[2, 0]
+    if not (abs(a) > smallest and abs(a) >= _BUNCH_PARLETT * max(abs(b), abs(c))):
+        return -1
+    i0 = 1.0 / a
+    l10, l20 = b * i0, c * i0
+    d, e = A[1, 1] - l10 * b, A[2, 1] - l20 * b
+    if not (abs(d) > smallest and abs(d) >= _BUNCH_PARLETT * abs(e)):
+        return -1
+    i1 = 1.0 / d
+    l21 = e * i1
+    f = A[2, 2] - l20 * c - l21 * e
+    if not abs(f) > smallest:
+        return -1
+    i2 = 1.0 / f
+    m20 = l10 * l21 - l20  # of L^-1
+    A[0, 0] = -i0 - l10 * l10 * i1 - m20 * m20 * i2
+    A[1, 0] = l10 * i1 + l21 * m20 * i2
+    A[1, 1] = -i1 - l21 * l21 * i2
+    A[2, 0] = -m20 * i2
+    A[2, 1] = l21 * i2
+    A[2, 2] = -i2
+    A[0, 1], A[0, 2], A[1, 2] = A[1, 0], A[2, 0], A[2, 1]
+    return (a < 0.0) + (d < 0.0) + (f < 0.0)
+
+
+@njit(cache=True)
 def solve_dense(A, x):
     """Replace ``x`` (m, r) by A^-1 x; Gaussian elimination with partial pivoting, destroys A.
 

@@ -14,12 +14,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from der.assembly import assemble, take_out
+from der.assembly import assemble, hold
 from der.block_ldl import factor, inertia, solve_refined
 from der.frames import Array, into_frame, turned
 from der.rod import Rod, State
 from der.supports import Supports, check_cut
 
+# of the tolerance, for the start and the first iterate: a good start would stop right below it,
+# which a fold magnifies; later iterates may not get there, close to a branch point
+_CLOSE = 1e-2
 _LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the path
 
 
@@ -129,11 +132,12 @@ def _correct(
         if system.bent_too_far >= 0:
             outcome = 3
             break
-        done = residual <= max(tolerance, 10.0 * system.noise)
+        wanted = tolerance if iteration > 1 or iteration == most else _CLOSE * tolerance
+        done = residual <= max(wanted, 10.0 * system.noise)
         if not done and iteration >= most:
             break
-        diag, off, border = take_out(held.free, system.diag, system.off, system.border)
-        column = system.load_column
+        diag, off, border, column = system.diag, system.off, system.border, system.load_column
+        hold(held.free, diag, off, border)
         for j in range(n):
             for i in range(b):
                 x[j, i, 0] = -system.grad[j, i]

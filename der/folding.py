@@ -99,7 +99,7 @@ def fold(
         raise Interrupted(record("interrupted", "stopped by the user")) from None
     message = NEVER if visits[-1].at.state.load == -scene.gamma_max else ""
     if scene.error_bars:
-        return replace(_with_error_bars(scene, piece, visits, record), message=message)
+        return replace(_with_error_bars(scene, piece, wanted, visits, record), message=message)
     return record("done", message)
 
 
@@ -116,15 +116,23 @@ def _piece(scene: Scene, n_edges: int, name: str) -> Sector:
 
 
 def _with_error_bars(
-    scene: Scene, piece: Sector, visits: list[Visit], record: Callable[[str], Path]
+    scene: Scene,
+    piece: Sector,
+    wanted: Wanted,
+    visits: list[Visit],
+    record: Callable[[str], Path],
 ) -> Path:
     """The record with the values extrapolated from three meshes, and their errors.
 
-    Indices, and the mode but for its slope, are those of the scene's own mesh.
+    Indices, and the mode but for its slope, are those of the scene's own mesh. Where the path of
+    the coarsest ends elsewhere, all values are, and no error is known.
     """
     from der.error_bars import error_bars
 
     coarse = [_piece(scene, n, piece.name) for n in meshes(scene.n_edges, piece.name)[1:]]
+    end = _end(coarse[-1], replace(wanted, most_steps=4 * len(visits) + 100))
+    if end != visits[-1].at.state.load:
+        return _without_errors(record("done"), scene.n_edges // 4, end)
     asked = {math.pi, scene.gamma_max}
     if scene.save_at is not None:
         asked |= set(scene.save_at)
@@ -160,6 +168,32 @@ def _with_error_bars(
         mode=mode,
         error=bars.error,
         raw=bars.raw,
+    )
+
+
+def _end(piece: Sector, wanted: Wanted) -> float | None:
+    """The load at which a path ends; None where it cannot be followed."""
+    bare = replace(wanted, targets=(), stability=False, contacts=False)
+    try:
+        return [visit.at.state.load for visit in follow(piece, bare, Tally())][-1]
+    except Stuck:
+        return None
+
+
+def _without_errors(path: Path, n_edges: int, end: float | None) -> Path:
+    """A record whose error bars say that ``n_edges`` edges lead to another ``end``."""
+    where = "cannot be followed to an end" if end is None else f"ends at gamma = {end:.6g}"
+    unknown: dict[str, object] = {
+        name: [None] * len(path) for name in ("gamma", "moment", "energy")
+    }
+    how = (
+        f"null, and values not extrapolated: on {n_edges} edges the path {where}, so that the"
+        " meshes are not yet of one kind; use more edges"
+    )
+    return replace(
+        path,
+        error=unknown | {"slope_at_pi": None, "how": how},
+        raw={name: getattr(path, name).tolist() for name in ("gamma", "moment", "energy")},
     )
 
 
@@ -313,11 +347,16 @@ def _shapes(scene: Scene, piece: Sector, visits: list[Visit], status: str) -> Sh
     return shapes(piece, visits, arc_length, history=scene.history, modes=modes)
 
 
-def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
+@cache
+def _release() -> str:
+    """The package's version: looking it up reads a file."""
     try:
-        release = version("ring-origami")
+        return version("ring-origami")
     except PackageNotFoundError:  # run from a source tree that was never installed
-        release = "unknown"
+        return "unknown"
+
+
+def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
     return {
         "n_edges": scene.n_edges,
         "sector": piece.name,
@@ -333,5 +372,5 @@ def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
         "error_bars": scene.error_bars,
         "save_at": None if scene.save_at is None else list(scene.save_at),
         "stability": scene.stability,
-        "version": release,
+        "version": _release(),
     }

@@ -99,3 +99,22 @@ def rotation_vector(qa, qb):
         for i in range(3):
             w[j, i] = scale * p[i + 1]
     return w
+
+
+@njit(cache=True)
+def chart_rate(w, omega):
+    """Rates (n, 3) of rotation vectors ``w`` (n, 3) of frames that turn at the rates ``omega``.
+
+    Both in the moving frames q o exp(w/2); to third order in w: dw = omega + w x omega/2 +
+    w x (w x omega)/12.
+    """
+    n = w.shape[0]
+    rate = np.empty((n, 3))
+    for j in range(n):
+        x, y, z = w[j, 0], w[j, 1], w[j, 2]
+        a, b, c = omega[j, 0], omega[j, 1], omega[j, 2]
+        u, v, t = y * c - z * b, z * a - x * c, x * b - y * a  # w x omega
+        rate[j, 0] = a + 0.5 * u + (y * t - z * v) / 12.0
+        rate[j, 1] = b + 0.5 * v + (z * u - x * t) / 12.0
+        rate[j, 2] = c + 0.5 * t + (x * v - y * u) / 12.0
+    return rate

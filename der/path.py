@@ -1,7 +1,8 @@
 """Following a path of equilibria through its folds, by pseudo-arclength (Riks, Keller).
 
 The norm is mass-weighted, of rotation vectors and load, and does not depend on the mesh. The
-predictor is of second order; steps are as long as the angle between tangents allows.
+predictor is the cubic through the last two states (`Step.beyond`); steps are as long as the angle
+between tangents allows.
 """
 
 from __future__ import annotations
@@ -46,12 +47,12 @@ def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
         raise Stuck(f"the flat ring is no equilibrium: {ADVICE[at.outcome]}")
     here = visit(piece, wanted, at)
     yield here
-    bend = None  # rate of change of the tangent over the last step
+    before: Step | None = None
     length = FIRST_STEP
     while True:
         if tally.steps >= wanted.most_steps:
             raise Stuck(f"the path has not ended after {tally.steps} steps")
-        step = _advance(piece, wanted, tally, here.at, bend, length)
+        step = _advance(piece, wanted, tally, here.at, before, length)
         try:
             found, ended = special_points(piece, wanted, step, here)
         except Stuck:
@@ -61,12 +62,8 @@ def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
             length = 0.25 * step.length
             continue
         tally.steps += 1
+        before = step
         angle = _between(piece, here.at, step.end)
-        bend = Direction(
-            (step.end.tangent.q - here.at.tangent.q) / step.length,
-            (step.end.tangent.force - here.at.tangent.force) / step.length,
-            (step.end.tangent.load - here.at.tangent.load) / step.length,
-        )
         yield from found
         here = found[-1]
         if ended:
@@ -96,26 +93,17 @@ def _advance(
     wanted: Wanted,
     tally: Tally,
     start: Equilibrium,
-    bend: Direction | None,
+    before: Step | None,
     length: float,
 ) -> Step:
     """One accepted step of at most ``length``, shortened until Newton's method follows."""
     t = start.tangent
     reason = ""
     while length > SMALLEST_STEP:
-        guess = Direction(length * t.q, length * t.force, length * t.load)
-        if bend is not None:
-            half = 0.5 * length * length
-            guess = Direction(
-                guess.q + half * bend.q,
-                guess.force + half * bend.force,
-                guess.load + half * bend.load,
-            )
-            # s is the projection on the tangent, which the second-order term must not change
-            excess = dot(piece.body, t, guess) - length
-            guess = Direction(
-                guess.q - excess * t.q, guess.force - excess * t.force, guess.load - excess * t.load
-            )
+        if before is None:
+            guess = Direction(length * t.q, length * t.force, length * t.load)
+        else:
+            guess = before.beyond(length)
         end = equilibrium(
             piece.body,
             piece.held,

@@ -19,7 +19,7 @@ from der.equilibrium import Equilibrium
 from der.rod import strains
 from der.sector import Sector
 from der.stability import index_and_stiffness, raw_index
-from der.step import ROOT, Step, root
+from der.step import ROOT, Step
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-4  # of s, for the passage of a strand: an ideal ring asks for no more
@@ -119,12 +119,12 @@ def _folds(step: Step) -> list[tuple[float, Equilibrium]]:
     """Folds of the load within a step, also a pair of them between tangents of equal sign."""
     rates = (step.start.tangent.load, step.end_rate.load)
     cuts = [0.0, *_slowest(step.length, step.jump.load, *rates), step.length]
-    found = []
-    for s0, s1 in pairwise(cuts):
-        if step.at(s0).tangent.load * step.at(s1).tangent.load < 0.0:
-            s = root(lambda t: step.at(t).tangent.load, s0, s1)
-            found.append((s, step.at(s)))
-    return found
+    places = [(s, step.at(s)) for s in cuts]
+    return [
+        step.change(lambda at: at.tangent.load, low, high)
+        for low, high in pairwise(places)
+        if low[1].tangent.load * high[1].tangent.load < 0.0
+    ]
 
 
 def _slowest(length: float, jump: float, first: float, last: float) -> list[float]:
@@ -192,10 +192,11 @@ def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
         inside = _slowest(
             b.s - a.s, last.moment - first.moment, first.moment_rate, last.moment_rate
         )
-        for s0, s1 in pairwise([a.s, *(a.s + u for u in inside), b.s]):
-            if step.at(s0).moment_rate * step.at(s1).moment_rate < 0.0:
-                s = root(lambda t: step.at(t).moment_rate, s0, s1)
-                found.append(_Mark(s, Visit(step.at(s), "limit")))
+        middle = [(a.s + u, step.at(a.s + u)) for u in inside]
+        for low, high in pairwise([(a.s, first), *middle, (b.s, last)]):
+            if low[1].moment_rate * high[1].moment_rate < 0.0:
+                s, at = step.change(lambda at: at.moment_rate, low, high)
+                found.append(_Mark(s, Visit(at, "limit")))
     return found
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from der.equilibrium import (
     equilibrium,
     moved,
 )
-from der.frames import Array, rotation_vector
+from der.frames import Array, chart_rate, rotation_vector
 from der.rod import State
 from der.sector import Sector
 
@@ -51,38 +52,68 @@ class Step:
     length: float
     tolerance: float
     tally: Tally
-    jump: Direction = field(init=False)
-    end_rate: Direction = field(init=False)
-    basis: Array = field(init=False)  # (3, n b + n_c + 1) rate, jump and end rate, flat
+    jump: Direction = field(init=False)  # from the start to the end
+    end_rate: Direction = field(init=False)  # d jump/ds
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
-        q = np.empty_like(a.tangent.q)
-        q[:, :3] = rotation_vector(a.state.quat, b.state.quat)
-        if q.shape[1] == 4:
-            q[:, 3] = b.state.stretch - a.state.stretch
-        q[~self.piece.held.free] = 0.0
+        q = self._between(a.state, b.state)
         jump = Direction(q, b.state.force - a.state.force, b.state.load - a.state.load)
-        # d/ds at the end, where s is measured along the tangent at the start
-        rate = 1.0 / dot(self.piece.body, a.tangent, b.tangent)
         t = b.tangent
-        end_rate = Direction(t.q * rate, t.force * rate, t.load * rate)
-        flat = [
-            np.concatenate([d.q.ravel(), d.force, [d.load]]) for d in (a.tangent, jump, end_rate)
-        ]
+        # d/ds at the end, where s is measured along the tangent at the start. That its frames have
+        # turned is left aside, unlike in `beyond`: with it, branch points came out off by 1e-10
+        rate = 1.0 / dot(self.piece.body, a.tangent, t)
         object.__setattr__(self, "jump", jump)
-        object.__setattr__(self, "end_rate", end_rate)
-        object.__setattr__(self, "basis", np.array(flat))
+        object.__setattr__(self, "end_rate", Direction(t.q * rate, t.force * rate, t.load * rate))
+
+    def _between(self, a: State, b: State) -> Array:
+        """The free rotations and stretches (n, b) that lead from one state to another."""
+        q = np.empty_like(self.start.tangent.q)
+        q[:, :3] = rotation_vector(a.quat, b.quat)
+        if q.shape[1] == 4:
+            q[:, 3] = b.stretch - a.stretch
+        q[~self.piece.held.free] = 0.0
+        return q
+
+    @cached_property
+    def _basis(self) -> Array:
+        """Rate at the start, jump and rate at the end, each flat: (3, n b + n_c + 1)."""
+        rates = (self.start.tangent, self.jump, self.end_rate)
+        return np.array([np.concatenate([d.q.ravel(), d.force, [d.load]]) for d in rates])
+
+    def _hermite(self, s: float) -> tuple[float, float, float]:
+        """Weights of the rate at the start, the jump and the rate at the end at ``s``."""
+        u = s / self.length
+        return (
+            self.length * u * (1.0 - u) ** 2,
+            u * u * (3.0 - 2.0 * u),
+            self.length * u * u * (u - 1.0),
+        )
 
     def offset(self, s: float) -> Direction:
         """Cubic increment from the start to ``s``."""
-        u = s / self.length
-        h10 = self.length * u * (1.0 - u) ** 2
-        h01 = u * u * (3.0 - 2.0 * u)
-        h11 = self.length * u * u * (u - 1.0)
-        cubic = np.array([h10, h01, h11]) @ self.basis
+        cubic = np.array(self._hermite(s)) @ self._basis
         q = self.jump.q
         return Direction(cubic[: q.size].reshape(q.shape), cubic[q.size : -1], float(cubic[-1]))
+
+    def beyond(self, s: float) -> Direction:
+        """Increment from the end to ``s`` beyond it, measured along the tangent there.
+
+        The cubic through both states and tangents, in the frames of the end.
+        """
+        body, t, jump = self.piece.body, self.end.tangent, self.jump
+        rate = self.start.tangent.q.copy()
+        rate[:, :3] = chart_rate(-jump.q[:, :3], rate)
+        start = self.start.tangent._replace(q=rate)
+        length = dot(body, t, jump)
+        u = s / length
+        of_start = s * u * (1.0 + u) / dot(body, t, start)
+        of_end, of_jump = s * (1.0 + u) ** 2, -u * u * (3.0 + 2.0 * u)
+        return Direction(
+            of_end * t.q + of_start * start.q + of_jump * jump.q,
+            of_end * t.force + of_start * start.force + of_jump * jump.force,
+            of_end * t.load + of_start * start.load + of_jump * jump.load,
+        )
 
     @property
     def bulge(self) -> float:
@@ -104,6 +135,23 @@ class Step:
             return self.end
         return self._solved(s, self.offset(s), Control.DIRECTION)
 
+    def change(
+        self,
+        value: Callable[[Equilibrium], float],
+        low: tuple[float, Equilibrium],
+        high: tuple[float, Equilibrium],
+    ) -> tuple[float, Equilibrium]:
+        """The place between two, and its state, where ``value`` of the state changes its sign."""
+        known = dict((low, high))
+
+        def of_place(s: float) -> float:
+            if s not in known:
+                known[s] = self.at(s)
+            return value(known[s])
+
+        s = root(of_place, low[0], high[0])
+        return s, known[s]
+
     def near(self, s: float) -> State:
         """A state near the equilibrium at ``s``: the cubic with one correction, half the price."""
         found = equilibrium(
@@ -122,7 +170,7 @@ class Step:
         """The equilibrium at ``load`` between s = low and high, where the load is monotonic."""
 
         def cubic(s: float) -> float:
-            return self.start.state.load + self.offset(s).load - load
+            return self.start.state.load + self._load(s) - load
 
         if cubic(low) * cubic(high) < 0.0:
             s = root(cubic, low, high)
@@ -137,18 +185,14 @@ class Step:
                 found = replace(found, state=found.state.but(load=load))
                 return min(max(self._place(found, s, step), low), high), found
         # close to a fold: the load is a bad coordinate there, s is not
-        s = root(lambda t: self.at(t).state.load - load, low, high)
-        found = self.at(s)
+        ends = (low, self.at(low)), (high, self.at(high))
+        s, found = self.change(lambda at: at.state.load - load, *ends)
         return s, replace(found, state=found.state.but(load=load))
 
     def _place(self, found: Equilibrium, s: float, guess: Direction) -> float:
         """The s of a state found near ``guess`` at ``s``: where its own projection lies."""
         state = moved(self.piece.held, self.start.state, guess)
-        q = np.zeros_like(self.jump.q)
-        q[:, :3] = rotation_vector(state.quat, found.state.quat)
-        if q.shape[1] == 4:
-            q[:, 3] = found.state.stretch - state.stretch
-        q[~self.piece.held.free] = 0.0
+        q = self._between(state, found.state)
         return s + dot(self.piece.body, self.start.tangent, Direction(q, guess.force, 0.0))
 
     def _near(self, found: Equilibrium, s: float) -> bool:
@@ -158,9 +202,16 @@ class Step:
         away = float(np.sum(self.piece.body.mass * (q - self.offset(s).q[:, :3]) ** 2)) ** 0.5
         return away < 0.1 * self.length and found.tangent.load * self._load_rate(s) > 0.0
 
+    def _load(self, s: float) -> float:
+        """The load of `offset`, less that of the start."""
+        of_start, of_jump, of_end = self._hermite(s)
+        start, end = self.start.tangent.load, self.end_rate.load
+        return of_start * start + of_jump * self.jump.load + of_end * end
+
     def _load_rate(self, s: float) -> float:
+        """Its rate, to leading order."""
         h = 1e-3 * self.length
-        return self.offset(s + h).load - self.offset(s - h).load
+        return self._load(s + h) - self._load(s - h)
 
     def _solved(self, s: float, step: Direction, control: Control) -> Equilibrium:
         found = equilibrium(

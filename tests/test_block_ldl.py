@@ -12,6 +12,7 @@ from der.block_ldl import (
     factor,
     inertia,
     invert,
+    invert_three,
     solve_augmented,
     solve_band,
     solve_dense,
@@ -158,6 +159,25 @@ def test_invert_a_block(m, kind):
     assert_allclose(
         swept, expected, rtol=0, atol=1e-14 * np.linalg.cond(A) * np.abs(expected).max()
     )
+
+
+def test_three_by_formula_is_three_by_sweeps():
+    """Where `invert_three` takes a block: the same -A^-1 and count; where not, A is left alone."""
+    taken = 0
+    for seed in range(40):
+        A = np.random.default_rng(seed).normal(size=(3, 3))
+        A = A + A.T
+        by_formula, by_sweeps = A.copy(), A.copy()
+        negative = invert_three(by_formula, 1e-4)
+        if negative < 0:
+            assert_allclose(by_formula, A, rtol=0, atol=0)
+            continue
+        taken += 1
+        assert negative == negatives(A) == invert(by_sweeps, 0.0, np.zeros(3))[0]
+        assert_allclose(by_formula, by_sweeps, rtol=1e-12, atol=1e-12 * np.abs(by_sweeps).max())
+    assert 5 < taken < 40
+    for small in np.diag([1e-6, 1.0, 1.0]), np.diag([1.0, 1e-6, 1.0]), np.diag([1.0, 1.0, 1e-6]):
+        assert invert_three(small, 1e-4) == -1
 
 
 @pytest.mark.parametrize("m", range(1, 7))

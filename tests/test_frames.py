@@ -10,6 +10,7 @@ from rods import turned_all
 from scipy.spatial.transform import Rotation
 
 from der.frames import (
+    chart_rate,
     into_frame,
     relative,
     rotation,
@@ -165,3 +166,19 @@ def test_a_tangent_round_an_octant_brings_the_frame_back_by_a_right_angle():
         q = turned_by(q, w)
     expected = start @ Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi]).as_matrix()
     assert_allclose(rotation(q), expected, rtol=0, atol=3e-15)
+
+
+@SEEDS
+def test_rates_of_rotation_vectors(seed):
+    """d log(conj(qa) o qb)/dt where qb turns at omega, against central differences.
+
+    The series ends with w^2: its next term is w^4/720 at most, 1e-6 here; differences err by 1e-9.
+    """
+    qa, rng = unit_quaternions(seed, 20), np.random.default_rng(seed)
+    w, omega = 0.1 * rng.uniform(-1, 1, (20, 3)), rng.uniform(-1, 1, (20, 3))
+    qb = np.array([turned_by(*pair) for pair in zip(qa, w, strict=True)])
+    there, back = (
+        rotation_vector(qa, np.array([turned_by(q, t * o) for q, o in zip(qb, omega, strict=True)]))
+        for t in (1e-5, -1e-5)
+    )
+    assert_allclose(chart_rate(w, omega), (there - back) / 2e-5, rtol=0, atol=2e-6)

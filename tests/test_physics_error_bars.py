@@ -257,3 +257,18 @@ def test_place_of_a_flat_limit_is_less_certain_than_its_neighbours():
     limit = max(i for i, k in enumerate(bars.order) if visits[k].kind == "limit")
     near = [bars.gamma_error[i] for i in (limit - 2, limit + 1)]
     assert bars.gamma_error[limit] > 2.0 * max(near)
+
+
+@pytest.mark.parametrize(("n_edges", "arrives"), [(128, False), (160, True)])
+def test_meshes_of_two_kinds_give_no_errors(n_edges, arrives):
+    """A near-stadium that folds on 160 edges and more and turns back before pi on 136 and fewer.
+
+    On 160, 80 and 40 edges the states could still be matched, with errors that mean nothing.
+    """
+    ring = der.rectangle(0.47043670726, 0.30053065027, "y")
+    section = der.rectangular_section(6.34, 0.0165)
+    scene = der.Scene(ring, section, n_edges=n_edges, error_bars=True, stability=False)
+    path = der.fold(scene)
+    assert (path.gamma[-1] > 0.0) == arrives
+    assert all(e is None for e in path.error["energy"]) == arrives
+    assert ("40 edges the path ends" in path.error["how"]) == arrives
