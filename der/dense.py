@@ -119,7 +119,7 @@ def invert_three(A, smallest):
     A[2, 1] = l21 * i2
     A[2, 2] = -i2
     A[0, 1], A[0, 2], A[1, 2] = A[1, 0], A[2, 0], A[2, 1]
-    return (a < 0.0) + (d < 0.0) + (f < 0.0)
+    return int(a < 0.0) + int(d < 0.0) + int(f < 0.0)
 
 
 @njit(cache=True)
