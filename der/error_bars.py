@@ -21,6 +21,7 @@ from der.special import Visit
 
 _EXACT = 1e-9  # of the largest values: a state that is the same on every mesh, as the folded one
 _REST = 3.0  # see `_Corrections.bound`
+_SMALL = 0.01  # of the largest first correction: what is below says nothing of how fast they fall
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,8 @@ class _Corrections:
         first, last = changes[:, 0], changes[:, 1]
         sizes = np.linalg.norm(changes[:, :, :RATE] / scales[:RATE], axis=2)
         exact = sizes[:, 0] < _EXACT
-        ratio = (sizes[~exact, 1] / sizes[~exact, 0]).max(initial=0.0)
+        small = _SMALL * sizes[:, 0].max(initial=0.0)
+        ratio = (sizes[~exact, 1] / np.maximum(sizes[~exact, 0], small)).max(initial=0.0)
         return cls(places, first, last, exact, _REST * ratio * ratio, scales)
 
     def bound(self, k: int) -> Array | None:
@@ -178,7 +180,8 @@ class _Corrections:
         well behaved. It passes through zero where the error does not, so it is the largest of a
         state and its two neighbours, and the corrections to come are added as those of a geometric
         series: the first correction times the square of the largest ratio of the two along the
-        path, times `_REST`. The residual of the states is the floor.
+        path, times `_REST`. States close to the flat one, of next to no correction, do not count
+        for that ratio. The residual of the states is the floor.
         """
         place = self.places[k]
         if place is None or not place.sought:
