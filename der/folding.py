@@ -124,8 +124,9 @@ def _with_error_bars(
 ) -> Path:
     """The record with the values extrapolated from three meshes, and their errors.
 
-    Indices, and the mode but for its slope, are those of the scene's own mesh. Where the path of
-    the coarsest ends elsewhere, all values are, and no error is known.
+    Indices, and the mode but for its slope, are those of the scene's own mesh, unknown where a
+    state passes a fold or branch point on its way to the extrapolated curve. Where the path of the
+    coarsest ends elsewhere, so are all values, and no error is known.
     """
     from der.error_bars import error_bars
 
@@ -141,12 +142,12 @@ def _with_error_bars(
         most = math.ceil(last / EIGHTH)
         asked |= {k * EIGHTH for k in range(-most, most + 1)}
     bars = error_bars([piece, *coarse], visits, asked, tolerance=scene.tolerance)
-    turned = [k for k, visit in enumerate(visits) if visit.kind == "fold" and k in bars.order]
     place = {k: i for i, k in enumerate(bars.order)}
+    singular = [k for k in place if visits[k].kind in ("fold", "branch")]
     for k, visit in enumerate(visits):
-        passed = k in place and any((place[f] < place[k]) != (f < k) for f in turned)
-        if visit.kind == "contact" and passed:
-            visits[k] = replace(visit, index=None)  # it lay on the other side of the fold
+        if k in place and any((place[s] < place[k]) != (s < k) for s in singular):
+            # it lay on the other side of a singular state: the meshes do not agree on its index
+            visits[k] = replace(visit, index=None, sides=None)
     visits[:] = [visits[k] for k in bars.order]
     path = record("done")
 

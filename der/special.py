@@ -15,16 +15,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from der.branches import SAME, Change, Place, beside_folds, changes, is_fold, merged, own_changes
 from der.equilibrium import Equilibrium
 from der.rod import strains
 from der.sector import Sector
-from der.stability import index_and_stiffness, raw_index
-from der.step import ROOT, Step
+from der.stability import index_and_stiffness
+from der.step import Step
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-4  # of s, for the passage of a strand: an ideal ring asks for no more
 _BRIEF = 1e-3  # of s, between a passage and its reversal
-_TURN = 1e-4  # of a step: between a fold and the places where dgamma/ds has its two signs
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 # of the softest torsion of a ring, GJ (2 pi/L)^2: within a step a mode's stiffness was seen to
 # bulge by 0.002 of it at the median and by 0.06 in one of a hundred
@@ -93,6 +93,7 @@ class _Mark:
 
     s: float
     visit: Visit
+    change: tuple[int, int] | None = None  # of a branch point: its class, and by how much
 
 
 def special_points(
@@ -208,34 +209,37 @@ def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark])
         else m
         for m in line
     ]
-    folds = [m.s for m in line if m.visit.kind == "fold"]
-    flanks = [s for fold in folds for s in _beside(step, fold, folds, line[-1].s)]
+    folds = [m for m in line if m.visit.kind == "fold"]
+    flanks = [s for m in folds for s in _beside(step, [m], folds, line[-1].s)]
     known = [m for m in line if m.visit.kind != "fold"]
     known += [_Mark(s, visit(piece, wanted, step.at(s))) for s in flanks]
     known = [m for m in known if m.visit.index is not None and None not in m.visit.index]
-    found: list[_Mark] = []
+    found: list[Change] = []
+    hidden: list[_Mark] = []
     for a, b in pairwise(sorted(known, key=lambda m: m.s)):
-        # across a fold, the first class loses or gains one by the fold itself
-        first = 1 if any(a.s < s < b.s for s in folds) else 0
-        for c in range(first, len(piece.classes)):
-            places = [(m.s, (m.visit.index or ())[c]) for m in (a, b)]
-            if places[0][1] == places[1][1]:
+        across = [(m.s, m.visit.at) for m in folds if a.s < m.s < b.s]
+        for c in range(len(piece.classes)):
+            low, high = ((m.s, (m.visit.index or ())[c]) for m in (a, b))
+            if c == 0 and across:  # it loses or gains one by each fold itself
+                found += beside_folds(step, (low, a.visit.at), (high, b.visit.at), across)
+                continue
+            places = [low, high]
+            if low[1] == high[1]:
                 places[1:1] = _between_equals(piece, step, c, a, b)
-            for low, high in pairwise(places):
-                found += _branches(piece, step, c, low, high)
-    line = sorted([*line, *found], key=lambda m: m.s)
-    singular = [m.s for m in line if m.visit.kind in ("fold", "branch")]
-    return [
-        replace(m, visit=_with_sides(piece, wanted, step, m, singular, line[-1].s))
-        if m.visit.kind in ("fold", "branch")
-        else m
-        for m in line
+            for one in (one for ends in pairwise(places) for one in changes(step, c, *ends)):
+                if c == 0 and is_fold(step, one.s):  # one of two that the cubic did not show
+                    hidden.append(_Mark(one.s, Visit(one.at, "fold")))
+                else:
+                    found.append(one)
+    labels = list(piece.classes)
+    branches = [
+        _Mark(m.s, Visit(m.at, "branch", details={"symmetry": labels[m.c]}), (m.c, m.by))
+        for m in merged(step, found)
     ]
+    return _with_sides(piece, wanted, step, [*line, *hidden, *branches])
 
 
-def _between_equals(
-    piece: Sector, step: Step, c: int, a: _Mark, b: _Mark
-) -> list[tuple[float, int | None]]:
+def _between_equals(piece: Sector, step: Step, c: int, a: _Mark, b: _Mark) -> list[Place]:
     """A place between two states of equal index where class ``c`` has another, if there is one.
 
     Two changes of opposite sense within a step show at its ends only by a soft mode. Where there is
@@ -250,7 +254,7 @@ def _between_equals(
     _, modes = list(piece.classes.values())[c]
     there = (a.visit.index or ())[c]
 
-    def seen(u: float) -> tuple[tuple[float, int | None], float]:
+    def seen(u: float) -> tuple[Place, float]:
         s = a.s + u * (b.s - a.s)
         count, stiffness = index_and_stiffness(piece.body, piece.held, modes, step.at(s).state)
         return (s, count), stiffness
@@ -271,54 +275,59 @@ def _closest(first: float, middle: float, last: float) -> float | None:
     return u if least / first < _NEARLY * min(1.0, last / first) else None
 
 
-def _beside(step: Step, s: float, singular: list[float], end: float) -> tuple[float, float]:
-    """Places shortly before and after ``s``, nearer to it than to other singular states."""
-    apart = 1e-6 * step.length  # what lies closer is the same state
-    low = max((t for t in singular if t < s - apart), default=0.0)
-    high = min((t for t in singular if t > s + apart), default=end)
+def _beside(
+    step: Step, group: list[_Mark], singular: list[_Mark], end: float
+) -> tuple[float, float]:
+    """Places shortly before and after some marks, nearer to them than to other singular ones."""
+    apart = SAME * step.length
+    low, high = group[0].s, group[-1].s
+    last = max((m.s for m in singular if m.s < low - apart), default=0.0)
+    following = min((m.s for m in singular if m.s > high + apart), default=end)
     flank = _FLANK * step.length
-    return s - min(flank, 0.5 * (s - low)), s + min(flank, 0.5 * (high - s))
+    return low - min(flank, 0.5 * (low - last)), high + min(flank, 0.5 * (following - high))
 
 
-def _with_sides(
-    piece: Sector, wanted: Wanted, step: Step, mark: _Mark, singular: list[float], end: float
-) -> Visit:
-    """A singular state with the index on its two sides."""
-    before, after = (
-        visit(piece, wanted, step.at(s)).index for s in _beside(step, mark.s, singular, end)
-    )
-    return replace(mark.visit, sides=None if before is None or after is None else (before, after))
+def _with_sides(piece: Sector, wanted: Wanted, step: Step, marks: list[_Mark]) -> list[_Mark]:
+    """Marks in order, with the index on the two sides of singular states."""
+    line = sorted(marks, key=lambda m: m.s)
+    singular = [m for m in line if m.visit.kind in ("fold", "branch")]
+    sided: dict[int, _Mark] = {}
+    groups: list[list[_Mark]] = []
+    for m in singular:
+        if groups and m.s - groups[-1][-1].s < SAME * step.length:
+            groups[-1].append(m)
+        else:
+            groups.append([m])
+    for group in groups:
+        places = [step.at(s) for s in _beside(step, group, singular, line[-1].s)]
+        before, after = (visit(piece, wanted, at).index for at in places)
+        sides = _shared(places[0], group, before, after)
+        for m, pair in zip(group, sides, strict=True):
+            sided[id(m)] = replace(m, visit=replace(m.visit, sides=pair))
+    return [sided.get(id(m), m) for m in line]
 
 
-def _branches(
-    piece: Sector,
-    step: Step,
-    c: int,
-    low: tuple[float, int | None],
-    high: tuple[float, int | None],
-) -> list[_Mark]:
-    """Where the index of class ``c`` changes between two places, by bisection."""
-    label, (_, modes) = list(piece.classes.items())[c]
-    if low[1] == high[1]:
-        return []
-    if high[0] - low[0] < 2.0 * ROOT:
-        at = step.at(low[0])
-        if c == 0 and _turns(step, low[0]):  # one of two folds that the cubic did not show
-            return [_Mark(low[0], Visit(at, "fold"))]
-        return [_Mark(low[0], Visit(at, "branch", details={"symmetry": label}))]
-    s = 0.5 * (low[0] + high[0])
-    middle = (s, raw_index(piece.body, piece.held, modes, step.at(s).state))
-    return [
-        *_branches(piece, step, c, low, middle),
-        *_branches(piece, step, c, middle, high),
-    ]
+def _shared(
+    start: Equilibrium, group: list[_Mark], before: Indices | None, after: Indices | None
+) -> list[tuple[Indices, Indices] | None]:
+    """The index on the two sides of each of some singular states in one place, one after another.
 
-
-def _turns(step: Step, s: float) -> bool:
-    """Whether the load turns at ``s``; the tangent at a branch point itself tells nothing."""
-    away = _TURN * step.length
-    before, after = max(s - away, 0.0), min(s + away, step.length)
-    return step.at(before).tangent.load * step.at(after).tangent.load < 0.0
+    ``start``: the state before them.
+    """
+    if before is None or after is None:
+        return [None] * len(group)
+    if len(group) == 1:
+        return [(before, after)]
+    folds = own_changes(start, [m.visit.at for m in group if m.change is None])
+    sides: list[tuple[Indices, Indices] | None] = []
+    for m in group:
+        c, by = m.change or (0, folds.pop(0))
+        past = tuple(
+            None if count is None else count + by * (k == c) for k, count in enumerate(before)
+        )
+        sides.append((before, past))
+        before = past
+    return sides if before == after else [None] * len(group)
 
 
 def _passages(

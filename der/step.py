@@ -57,23 +57,23 @@ class Step:
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
-        q = self._between(a.state, b.state)
-        jump = Direction(q, b.state.force - a.state.force, b.state.load - a.state.load)
-        t = b.tangent
-        # d/ds at the end, where s is measured along the tangent at the start. That its frames have
-        # turned is left aside, unlike in `beyond`: with it, branch points came out off by 1e-10
+        jump = self.between(a.state, b.state)
+        # d/ds at the end, where s is measured along the tangent at the start, and in its frames
+        q = b.tangent.q.copy()
+        q[:, :3] = chart_rate(jump.q[:, :3], q)
+        t = b.tangent._replace(q=q)
         rate = 1.0 / dot(self.piece.body, a.tangent, t)
         object.__setattr__(self, "jump", jump)
         object.__setattr__(self, "end_rate", Direction(t.q * rate, t.force * rate, t.load * rate))
 
-    def _between(self, a: State, b: State) -> Array:
-        """The free rotations and stretches (n, b) that lead from one state to another."""
+    def between(self, a: State, b: State) -> Direction:
+        """The increment that leads from one state to another."""
         q = np.empty_like(self.start.tangent.q)
         q[:, :3] = rotation_vector(a.quat, b.quat)
         if q.shape[1] == 4:
             q[:, 3] = b.stretch - a.stretch
         q[~self.piece.held.free] = 0.0
-        return q
+        return Direction(q, b.force - a.force, b.load - a.load)
 
     @cached_property
     def _basis(self) -> Array:
@@ -133,7 +133,7 @@ class Step:
             return self.start
         if s == self.length:
             return self.end
-        return self._solved(s, self.offset(s), Control.DIRECTION)
+        return self.polished(s, moved(self.piece.held, self.start.state, self.offset(s)))
 
     def change(
         self,
@@ -177,7 +177,8 @@ class Step:
             step = self.offset(s)
             step = step._replace(load=load - self.start.state.load)
             try:
-                found = self._solved(s, step, Control.LOAD)
+                guess = moved(self.piece.held, self.start.state, step)
+                found = self.polished(s, guess, Control.LOAD)
             except Stuck:
                 found = None
             if found is not None and self._near(found, s):
@@ -192,8 +193,8 @@ class Step:
     def _place(self, found: Equilibrium, s: float, guess: Direction) -> float:
         """The s of a state found near ``guess`` at ``s``: where its own projection lies."""
         state = moved(self.piece.held, self.start.state, guess)
-        q = self._between(state, found.state)
-        return s + dot(self.piece.body, self.start.tangent, Direction(q, guess.force, 0.0))
+        away = self.between(state, found.state)._replace(load=0.0)
+        return s + dot(self.piece.body, self.start.tangent, away)
 
     def _near(self, found: Equilibrium, s: float) -> bool:
         """Whether a state found at given load lies where the cubic expects it."""
@@ -213,21 +214,46 @@ class Step:
         h = 1e-3 * self.length
         return self._load(s + h) - self._load(s - h)
 
-    def _solved(self, s: float, step: Direction, control: Control) -> Equilibrium:
+    def as_is(self, s: float, state: State) -> Equilibrium:
+        """A ``state`` at ``s`` as the equilibrium that it is to the tolerance, not moved.
+
+        At a branch point Newton's method would move it along the mode that has no stiffness.
+
+        Raises
+        ------
+        Stuck
+            Where it is none and Newton's method, tried then, fails.
+        """
+        found = self._newton(state, Control.DIRECTION, iterations=0)
+        return found if found.converged else self.polished(s, state)
+
+    def polished(self, s: float, guess: State, control: Control = Control.DIRECTION) -> Equilibrium:
+        """The equilibrium next to a ``guess`` at ``s``.
+
+        Raises
+        ------
+        Stuck
+            Where Newton's method fails.
+        """
+        found = self._newton(guess, control)
+        if not found.converged:
+            raise Stuck(
+                f"no equilibrium within a step, at gamma = {guess.load:.6f}"
+                f" (s = {s:.3g} of {self.length:.3g}): {ADVICE[found.outcome]}"
+            )
+        return found
+
+    def _newton(self, guess: State, control: Control, iterations: int = 12) -> Equilibrium:
         found = equilibrium(
             self.piece.body,
             self.piece.held,
-            moved(self.piece.held, self.start.state, step),
+            guess,
             along=self.start.tangent,
             control=control,
             tolerance=self.tolerance,
+            iterations=iterations,
         )
         self.tally.newton_iterations += found.iterations
-        if not found.converged:
-            raise Stuck(
-                f"no equilibrium within a step, at gamma = {self.start.state.load + step.load:.6f}"
-                f" (s = {s:.3g} of {self.length:.3g}): {ADVICE[found.outcome]}"
-            )
         return found
 
 

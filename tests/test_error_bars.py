@@ -268,3 +268,24 @@ def test_meshes_that_do_not_divide_are_refused(n_edges, name):
     """N/4 edges have to fit the sector, and be at least 8."""
     with pytest.raises(ValueError, match=f"n_edges must be .* got {n_edges}"):
         meshes(n_edges, name)
+
+
+def test_a_state_that_passes_a_branch_point_has_no_index():
+    """h/t = 1 beyond pi: a pair of odd modes at gamma = 5.42455 on 64 edges, 5.4273 on fine ones.
+
+    Of the state asked for in between, 64 edges say index 1 and fine meshes 3: it is not known. Over
+    every other stretch between folds and branch points the index stays.
+    """
+    wants = {"until": "folded", "contacts": False, "error_bars": True, "save_at": (5.425,)}
+    path = der.fold(der.Scene(der.circle(), der.rectangular_section(1.0), **wants))
+    singular = {p.position: p for p in path.points if p.kind in ("fold", "branch")}
+    now, unknown = 0, []
+    for k, index in enumerate(path.index):
+        if k in singular:
+            assert singular[k].index_before == now
+            now = singular[k].index_after
+        elif index is np.ma.masked:
+            unknown.append(path.gamma[k])
+        else:
+            assert index == now
+    assert unknown == [5.425]

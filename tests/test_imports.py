@@ -47,6 +47,7 @@ ROOMS = {
         "sector",
         "equilibrium",
         "step",
+        "branches",
         "special",
         "path",
         "forces",

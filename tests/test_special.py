@@ -7,6 +7,7 @@ import pytest
 from rods import lifted
 
 import der
+from der.branches import is_fold
 from der.equilibrium import dot
 from der.path import follow
 from der.sector import sector
@@ -164,3 +165,81 @@ def test_states_of_the_half_are_those_of_the_full_ring():
         assert counted == sum(one.index)
         seen.add(counted)
     assert seen == {0, 1, 2}
+
+
+# --- what lies close together -------------------------------------------------------------------
+
+
+def singular(ring, h_over_t, **numerics):
+    """Folds and branch points of a path, as far as it goes."""
+    scene = der.Scene(ring, der.rectangular_section(h_over_t), contacts=False, **numerics)
+    return [p for p in der.fold(scene).points if p.kind in ("fold", "branch")]
+
+
+@pytest.mark.parametrize("same", [1e-6, 1e-2])
+@pytest.mark.parametrize("h_over_t", [0.29, 0.2905, 0.291])
+def test_a_branch_point_beside_a_fold_on_the_full_ring(h_over_t, same, monkeypatch):
+    """All modes of the full ring are of one class: a fold must not hide what changes beside it.
+
+    At kappa0 = 2 an out-of-phase mode crosses zero 4e-11 rad and less before the first fold,
+    touching it at h/t = 0.291. Truth: the half, on which the two are of different classes. Places
+    taken as one (``same``, of a step) share the change of the index.
+    """
+    ring = der.circle(natural_curvature=2.0)
+    half = singular(ring, h_over_t, sector="half", gamma_max=0.3)[:2]
+    monkeypatch.setattr("der.branches.SAME", same)
+    monkeypatch.setattr("der.special.SAME", same)
+    full = singular(ring, h_over_t, sector="full", gamma_max=0.3)[:2]
+    assert sorted(one.kind for one in full) == [one.kind for one in half] == ["branch", "fold"]
+    assert [(one.index_before, one.index_after) for one in full] == [(16, 15), (15, 14)]
+    gammas = [one.gamma for one in sorted(full, key=lambda one: one.kind)]
+    assert gammas == pytest.approx([one.gamma for one in half], abs=1e-10)
+
+
+@pytest.mark.parametrize("n_edges", [32, 64])
+def test_a_pair_of_modes_is_one_point_on_the_full_ring(n_edges):
+    """Modes odd on each arm cross zero together: one point whose index changes by two.
+
+    On the half it is one of each class, in their order. Gamma is that of the quarter, whose own
+    equations are not singular there: measured 2e-12 (1e-10, and up to four points on the full
+    ring, when states were solved for right next to the point).
+    """
+    circle, wants = der.circle(), {"n_edges": n_edges, "until": "folded"}
+    quarter, half, full = (
+        [one for one in singular(circle, 1.0, sector=name, **wants) if one.kind == "branch"]
+        for name in ("quarter", "half", "full")
+    )
+    steps = [(one.index_before, one.index_after) for one in quarter]
+    assert steps == [(1, 3), (3, 1), (1, 3)]
+    assert [(one.index_before, one.index_after) for one in full] == steps
+    assert [one.details["symmetry"] for one in half] == ["in phase", "out of phase"] * 3
+    assert [one.index_before for one in half] == [1, 2, 3, 2, 1, 2]
+    assert [one.index_after for one in half] == [2, 3, 2, 1, 2, 3]
+    for found in (full, half[::2], half[1::2]):
+        assert [a.gamma for a in found] == pytest.approx([b.gamma for b in quarter], abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("ring", "h_over_t", "name", "kinds"),
+    [
+        (der.circle(natural_curvature=2.0), 0.29, "full", {"branch", "fold"}),
+        (der.circle(), 1.6, "full", {"fold"}),
+        (SIXTY, 4.0, "full", {"branch", "fold"}),
+    ],
+)
+def test_a_fold_is_told_from_a_branch_point(ring, h_over_t, name, kinds):
+    """By the root of dgamma/dM, which is of no scale, also where the place is 1e-9 of s off."""
+    piece = sector(ring, der.rectangular_section(h_over_t), 64, name=name)
+    found = list(follow(piece, Wanted(contacts=False, load_max=math.pi, targets=()), Tally()))
+    seen = set()
+    for k, one in enumerate(found):
+        if one.kind not in ("fold", "branch"):
+            continue
+        a, b = (next(v for v in side if not v.kind) for side in (found[k::-1], found[k:]))
+        trial = Step(piece, a.at, b.at, 1.0, 1e-10, Tally())
+        step = Step(piece, a.at, b.at, dot(piece.body, a.at.tangent, trial.jump), 1e-10, Tally())
+        s = dot(piece.body, a.at.tangent, step.between(a.at.state, one.at.state))
+        for off in (-1e-9, 0.0, 1e-9):
+            assert is_fold(step, s + off) == (one.kind == "fold")
+        seen.add(one.kind)
+    assert seen == kinds
