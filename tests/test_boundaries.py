@@ -1,65 +1,27 @@
 """Boundaries of folding modes, followed in two parameters."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from validation.boundaries import boundaries
 from validation.cases import solve_case
 from validation.conditions import KINDS, Lost
 from validation.crossings import seeds
+from validation.edges import Corner, Curve
 from validation.families import family
-from validation.phase import phase, unexplained
+from validation.following import follow, unexplained
 from validation.polygons import meetings
-from validation.scan import scan, solve_all
+from validation.scan import Scan, scan
 from validation.store import Store
 from validation.tracing import corrected, trace
-from validation.workers import workers
 
 # of circles: the fold at pi, the cusp, the slope of the folded ring; closed form the last
 THRESHOLDS = {"foldability": 1.5075766, "snap-back": 1.839582, "stability": 3.4699278}
-
-
-@pytest.fixture(scope="module")
-def diagram(tmp_path_factory):
-    """A part of fig3a at the circle, both axes."""
-    ranges = {"b_over_a": (0.8, 1.0), "h_over_t": (1.0, 4.0)}
-    folder = tmp_path_factory.mktemp("diagram")
-    return phase("fig3a", folder, ranges=ranges, finest=8, workers=2, progress=False)
-
-
-@pytest.mark.parametrize("kind", THRESHOLDS)
-def test_boundaries_pass_the_circle_at_its_thresholds(diagram, kind):
-    """From both sides, b/a = 1 about x and about y, to 1e-6."""
-    ends = [
-        point
-        for curve in diagram.curves
-        if curve.kind == kind
-        for point in curve.points
-        if point.case.b_over_a == 1.0
-    ]
-    assert [end.case.h_over_t for end in ends] == pytest.approx([THRESHOLDS[kind]] * 2, abs=1e-6)
-    assert max(end.error for end in ends) < 1e-6
-
-
-def test_curves_explain_the_scan(diagram):
-    """Every edge between unlike cases of the scan has a boundary within a cell and a half."""
-    assert unexplained(diagram.scan, diagram.curves) == 0
-    assert unexplained(diagram.scan, diagram.curves[1:]) > 0
-
-
-def test_stability_is_the_same_about_both_axes(diagram):
-    """The folded ring is the same, and so is the mode that it loses: h/t at b/a = 0.8 to 1e-6."""
-    ends = [
-        point.case.h_over_t
-        for curve in diagram.curves
-        if curve.kind == "stability"
-        for point in curve.points
-        if point.case.b_over_a == 0.8
-    ]
-    assert ends == pytest.approx([3.060680] * 2, abs=1e-6)
 
 
 CORNERS = {  # of ellipses about y: b/a, h/t, gamma; a dense bisection of labels agrees to 4e-6
@@ -69,21 +31,62 @@ CORNERS = {  # of ellipses about y: b/a, h/t, gamma; a dense bisection of labels
 }
 
 
+class AboutY(NamedTuple):
+    """A part of fig. 3a, about y alone."""
+
+    scan: Scan
+    curves: list[Curve]
+    corners: list[Corner]
+
+
 @pytest.fixture(scope="module")
 def about_y(tmp_path_factory):
-    """Fig. 3a, with the part in which boundaries meet, on a coarse grid."""
-    ranges = {"b_over_a": (0.75, 1.0), "h_over_t": (1.5, 4.0)}
-    found = family("fig3a", ranges=ranges, finest=8)
-    with Store(tmp_path_factory.mktemp("about_y") / "c.jsonl") as store, workers(2) as crew:
-        of = replace(found, sheets=("y",), coarse=8)
-        rows = scan(of, store, crew, progress=False).sorted_rows
+    """Fig. 3a from where boundaries meet to the circle, on a coarse grid."""
+    of = family("fig3a", ranges={"b_over_a": (0.75, 1.0), "h_over_t": (1.4, 4.0)}, finest=8)
+    of = replace(of, sheets=("y",), coarse=8)
+    crew = SimpleNamespace(executor=ThreadPoolExecutor(1), width=1)
+    with Store(tmp_path_factory.mktemp("about_y") / "c.jsonl") as store:
+        found = scan(of, store, crew, progress=False)
+        return AboutY(found, *follow(found, store, crew, solve_case))
 
-        def solve(cases):
-            new = [case for case in dict.fromkeys(cases) if case.key not in store.rows]
-            solve_all(new, store, crew)
-            return [store.rows[case.key] for case in cases]
 
-        return boundaries(of, rows, solve=solve)
+@pytest.mark.parametrize("kind", THRESHOLDS)
+def test_boundaries_pass_the_circle_at_its_thresholds(about_y, kind):
+    """On the edge of the diagram, b/a = 1, to 1e-6."""
+    ends = [
+        point
+        for curve in about_y.curves
+        if curve.kind == kind
+        for point in curve.points
+        if point.case.b_over_a == 1.0
+    ]
+    assert [end.case.h_over_t for end in ends] == pytest.approx([THRESHOLDS[kind]], abs=1e-6)
+    assert max(end.error for end in ends) < 1e-6
+
+
+def test_curves_explain_the_scan(about_y):
+    """Every edge between unlike cases of the scan has a boundary within a cell and a half."""
+    assert unexplained(about_y.scan, about_y.curves) == 0
+    assert unexplained(about_y.scan, about_y.curves[1:]) > 0
+
+
+def test_stability_is_the_same_about_both_axes(about_y):
+    """The folded ring is the same, and so is the mode that it loses.
+
+    A place on the curve about y, of which that about x must be less than 1e-6 away.
+    """
+    (curve,) = [curve for curve in about_y.curves if curve.kind == "stability"]
+    of = family("fig3a")
+    for point in curve.points[3::6]:
+        place = np.array(of.unit(point.case))
+        state = next(seeds("stability", solve_case(of.case("x", place + np.array([0.0, 0.01])))))
+
+        def slope(u, seed):
+            found = KINDS["stability"].condition(of.case("x", u).scene(), seed)
+            return found.value, found
+
+        on_it = corrected(slope, place, state)
+        assert np.linalg.norm(on_it.u - place) < 1e-6
 
 
 def test_corners_are_solved_for(about_y):
@@ -116,7 +119,7 @@ def test_ends_of_curves_are_corners_or_on_the_edge(about_y):
     for curve in about_y.curves:
         for point in (curve.points[0], curve.points[-1]):
             b, h = point.case.b_over_a, point.case.h_over_t
-            assert b in (0.75, 1.0) or h in (1.5, 4.0) or (b, h) in corners
+            assert b in (0.75, 1.0) or h in (1.4, 4.0) or (b, h) in corners
 
 
 def test_exchange_of_paths_has_errors_like_the_others(about_y):

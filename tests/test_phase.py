@@ -63,7 +63,7 @@ def without_curves():
     """Boundaries as the scan sees them: following them is tested by itself."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "validation.phase._boundaries",
+            "validation.phase.follow",
             lambda found, *rest: Boundaries(scanned_boundaries(found), []),
         )
         yield

@@ -16,10 +16,14 @@ from pathlib import Path
 
 import pytest
 
-from validation.cases import Row, solve_case
+from validation.boundaries import Boundaries
+from validation.cases import LABELS, Row, solve_case
+from validation.edges import BoundaryPoint, Curve
 from validation.families import family
+from validation.following import follow
+from validation.jobs import AHEAD
 from validation.killed import NOTES, Killed, calm, kill, kill_and_resume, note, notes
-from validation.scan import AHEAD, BATCH, Interrupted, corners, scan, solve_all
+from validation.scan import BATCH, Interrupted, corners, scan, solve_all
 from validation.store import Store
 from validation.workers import Cluster, Processes, workers
 
@@ -72,7 +76,41 @@ def deadly(case):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+def along(solve, batch):
+    """In place of following a slice: one point of a curve, and a row."""
+    (task,) = batch
+    case = task.part.family.case("x", (0.6, task.part.plane, 0.6))
+    point = BoundaryPoint(case, math.pi, 0.0, 0.0)
+    return Boundaries([Curve("foldability", "x", (point,))], []), [solve(case)]
+
+
+def along_that_dies_once(solve, batch):
+    """`along`, but the first worker to come to the middle is killed."""
+    if batch[0].part.plane == 0.5:
+        try:
+            os.close(os.open(os.environ[NOTES], os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            return along(solve, batch)
+        os.kill(os.getpid(), signal.SIGKILL)
+    return along(solve, batch)
+
+
+def along_with_poison(solve, batch):
+    """`along`, but the slice in the middle kills every worker."""
+    if batch[0].part.plane == 0.5:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return along(solve, batch)
+
+
+def wedge(case):
+    """Foldable from h/t = 2.2 on."""
+    folds = case.h_over_t > 2.2
+    label = LABELS[3] if folds else LABELS[0]
+    return Row(case, label, folds, folds, "snap-through", moment=0.0, slope=1.0)
+
+
 TOY = replace(family("fig3a", finest=16), coarse=4)
+CUBE = replace(family("fig8a", finest=4), coarse=4)
 POISON = TOY.case("x", (0.5, 0.5))
 
 
@@ -277,6 +315,26 @@ def test_case_that_kills_its_workers_is_a_failed_row(tmp_path, undisturbed):
         found = scanned(TOY, tmp_path / "cases.jsonl", crew, toy_with_poison)
     bad = [row for row in found.sorted_rows if not row.ok]
     assert [(row.case, row.message) for row in bad] == [(POISON, "its worker died, 2 times")]
+
+
+@pytest.mark.parametrize(
+    ("work", "kinds"),
+    [
+        (along_that_dies_once, ["foldability"] * 5),
+        (along_with_poison, ["foldability"] * 2 + ["foldability (scan)"] + ["foldability"] * 2),
+    ],
+)
+def test_worker_killed_on_a_boundary_is_replaced(tmp_path, told, monkeypatch, work, kinds):
+    """Every slice of a cube has its curves, in order; one that kills has what the scan sees."""
+    monkeypatch.setattr("validation.following._follow", work)
+    with Store(tmp_path / "cases.jsonl") as store, workers(2) as crew:
+        found = scan(CUBE, store, Here(), solve=wedge, progress=False)
+        before = len(store)
+        curves = follow(found, store, crew, wedge).curves
+        assert len(store) - before == kinds.count("foldability")
+    assert [curve.kind for curve in curves] == kinds
+    planes = [CUBE.unit(curve.points[0].case)[1] for curve in curves]
+    assert planes == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 def test_workers_that_cannot_work_end_the_run(tmp_path):

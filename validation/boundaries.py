@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from validation.polygons import distance
 from validation.tracing import At, Function, corrected, trace
 
 BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for,
-CLOSEST = 1e-4  # and beside one with another near it, at least: nearer, labels do not tell
+CLOSEST = 3e-5  # and beside one with another near it, at least: nearer, labels do not tell
 NARROW = 1e-3  # of the side: cases so near to each other have the state that a condition needs
 BISECTED = 1e-6  # of the diagram's side
 SAME_CURVE = 1e-3  # of the diagram's side: above what chords leave of a curve
@@ -259,7 +260,8 @@ class _Diagram:
             if not _known(piece.kind, piece.points, kept):
                 kept.append(piece)
         there = {(corner, piece.kind) for piece in kept for corner in piece.corners}
-        return kept, [one for one in met if all((one, kind) in there for kind in one.kinds)]
+        met = [replace(m, kinds=tuple(k for k in m.kinds if (m, k) in there)) for m in met]
+        return kept, [one for one in met if len(one.kinds) > 1]
 
     # --- what only the label tells ---
 

@@ -33,6 +33,7 @@ TIGHT = 1e-11  # increments of a solution from which a condition is judged
 PROBE = 1e-3  # of s: first step of a secant
 BULGE = 1e-2  # of s: for a third derivative
 SMALL = 1e-10  # of s: a secant step that has converged
+FOLDED = 0.02  # M of a state that is about the folded one; its gamma less pi is less than the cube
 FARTHEST = 0.5  # of s: what lies farther is another state
 MOST = 20
 
@@ -167,17 +168,29 @@ def steepening(seed: Value) -> float:
 
 
 def foldability(scene: Scene, seed: Value) -> Value:
-    """Gamma less pi at a fold; the seed is one."""
+    """Gamma less pi at a fold; the seed is one, and not the folded state of `infinite_slope`."""
     system, near = carried(scene, seed)
     fold = _root(system, near, lambda at: at.tangent.gamma)
+    _not_folded(fold)
     return Value(fold.gamma - math.pi, fold, system)
 
 
 def snap_back(scene: Scene, seed: Value) -> Value:
-    """The extremum of dgamma/ds, where gamma bends from one way to the other; the seed has it."""
+    """The extremum of dgamma/ds, where gamma bends from one way to the other; the seed has it.
+
+    The folded state is always one, by symmetry, with `infinite_slope` as its condition: a cusp and
+    its mirror image may merge in it, and end there.
+    """
     system, near = carried(scene, seed)
     bend = _root(system, near, lambda at: _bend(system, at))
+    _not_folded(bend)
     return Value(bend.tangent.gamma, bend, system)
+
+
+def _not_folded(at: Solution) -> None:
+    """A fold or cusp that has merged with its mirror image has a condition of its own."""
+    if abs(at.moment) < FOLDED and abs(at.gamma - math.pi) < FOLDED**3:
+        raise Lost("it has become the folded state")
 
 
 def exchange(scene: Scene, seed: Value) -> Value:

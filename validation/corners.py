@@ -3,15 +3,15 @@
 Boundaries of unlike things cross, and their polygons say where to begin. The curve of the fold at
 pi touches others instead, where they have a state of which one more thing is true: those of
 exchanges and cusps where their gamma is pi, that of the infinite slope where gamma = pi is crossed
-to the fifth order. That is the second condition then.
+to the fifth order. That is the second condition then. The curve of a cusp ends there, too.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
+from itertools import combinations, product
 
 import numpy as np
 
@@ -36,8 +36,10 @@ TOUCHING = {  # what touches the fold at pi, and where
 ORDER = (*TOUCHING, "stability", FOLD)  # the first's state is the one that a corner tells of
 NEAR = 0.1  # of the square's side: a corner lies so near to its bracket
 BESIDE = 0.02  # of the side: a curve that ends so near to a corner on it ends there
+ASIDE = 2.5e-3  # of the side: what a chord of a curve is off at most
 SAME = 1e-6  # of the side: two corners so near are one
 DIFFERENT = 0.05  # gamma and M of states that are not the same, together
+LIKE = 0.5  # likewise, of those on a curve that ends in a corner: they change with a root there
 MOST = 20
 
 ConditionOf = Callable[[str], Function[Value]]
@@ -49,12 +51,12 @@ class Met:
 
     Attributes
     ----------
-    kinds : of the boundaries that meet
+    kinds : of the boundaries that meet, or may
     first, second : the corner as a point of each, with its state; the same state where they touch
     error : of its place, of the square's side
     """
 
-    kinds: tuple[str, str]
+    kinds: tuple[str, ...]
     first: At[Value]
     second: At[Value]
     error: float
@@ -86,17 +88,10 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
         if one.kind == other.kind:
             continue
         for u in [meeting.place for meeting in meetings(one.places, other.places)]:
-            (i, _), (j, _) = nearest(u, one.places), nearest(u, other.places)
-            seeds = one.points[i].state, other.points[j].state
-            if _same(*seeds):  # they touch, or are one: polygons cross there by chance
-                continue
-            try:
-                met = _solved((one.kind, other.kind), u, seeds, condition, touching=False)
-            except Lost:
-                continue
-            met = _once(met, found)
-            _put(one, met.first, met)
-            _put(other, met.second, met)
+            if (met := _meeting(one, other, u, condition)) is not None:
+                met = _once(met, found)
+                _put(one, met.first, met)
+                _put(other, met.second, met)
     for line in [line for line in lines if line.kind in TOUCHING]:
         for k in _touching(line):
             u = 0.5 * (line.points[k].u + line.points[k + 1].u)
@@ -106,15 +101,42 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
                 )
             except Lost:
                 continue
-            met = _once(met, found)
+            kinds = (*met.kinds, "snap-back") if line.kind == "infinite slope" else met.kinds
+            met = _once(replace(met, kinds=kinds), found)
             _put(line, met.first, met)
-            for fold in [other for other in lines if other.kind == FOLD]:
-                if nearest(met.first.u, fold.places)[1] < BESIDE:
-                    _put(fold, met.second, met)
-                    _end(fold, met)
+            for other in [other for other in lines if other.kind in kinds[1:]]:
+                if _has(other, met):
+                    _put(other, met.second, met)
+                    _end(other, met)
     for line in lines:
         _separate(line, condition(line.kind))
     return found
+
+
+def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | None:
+    """The corner near the crossing of two polygons, on both curves; None where there is none.
+
+    A state of either may turn into another one on its way to the corner, which is on another curve
+    then; so those at both ends of the polygon's side are tried.
+    """
+    (i, _), (j, _) = nearest(u, one.places), nearest(u, other.places)
+    for first, second in product(one.points[i : i + 2], other.points[j : j + 2]):
+        seeds = first.state, second.state
+        if _same(*seeds):  # they touch, or are one: polygons cross there by chance
+            return None
+        try:
+            met = _solved((one.kind, other.kind), u, seeds, condition, touching=False)
+        except Lost:
+            continue
+        if all(nearest(met.first.u, line.places)[1] < ASIDE for line in (one, other)):
+            return met
+    return None
+
+
+def _has(line: Line, met: Met) -> bool:
+    """Whether a curve comes close to a corner in a state like the corner's."""
+    near = [at for at in line.points if np.linalg.norm(at.u - met.first.u) < BESIDE]
+    return any(_same(at.state, met.second.state, LIKE) for at in near)
 
 
 def _once(met: Met, found: list[Met]) -> Met:
@@ -149,9 +171,9 @@ def _touching(line: Line) -> list[int]:
     return [k for k in range(len(values) - 2, -1, -1) if values[k] * values[k + 1] < 0.0]
 
 
-def _same(one: Value, other: Value) -> bool:
-    """Whether two states of a ring are about the same."""
-    return abs(one.at.gamma - other.at.gamma) + abs(one.at.moment - other.at.moment) < DIFFERENT
+def _same(one: Value, other: Value, within: float = DIFFERENT) -> bool:
+    """Whether two states are about the same."""
+    return abs(one.at.gamma - other.at.gamma) + abs(one.at.moment - other.at.moment) < within
 
 
 def _put(line: Line, at: At[Value], corner: Met) -> None:
@@ -168,14 +190,24 @@ def _put(line: Line, at: At[Value], corner: Met) -> None:
 
 
 def _end(line: Line, corner: Met) -> None:
-    """End the curve of a fold at a corner from where it goes back, or where the fold is gone."""
+    """End a curve at a corner from where it goes back, or where the fold or cusp is gone."""
     k, places = line.corners.index(corner), line.places
     if not 0 < k < len(places) - 1:
         return
-    back = (places[k] - places[k - 1]) @ (places[k + 1] - places[k]) < 0.0
-    if back or corner.kinds[0] == "infinite slope":
-        rest = slice(k + 1) if 2 * k >= len(places) else slice(k, None)
-        line.points, line.corners = line.points[rest], line.corners[rest]
+    sides = line.points[: k + 1], line.points[k:]
+    if corner.kinds[0] == "infinite slope":
+        first = _strongest(sides[0]) > _strongest(sides[1])
+    elif (places[k] - places[k - 1]) @ (places[k + 1] - places[k]) < 0.0:
+        first = len(sides[0]) > len(sides[1])
+    else:
+        return
+    rest = slice(k + 1) if first else slice(k, None)
+    line.points, line.corners = line.points[rest], line.corners[rest]
+
+
+def _strongest(points: list[At[Value]]) -> float:
+    """Largest |M| on a curve."""
+    return max(abs(at.state.at.moment) for at in points)
 
 
 def _solved(

@@ -56,16 +56,16 @@ class Curve:
 
 @dataclass(frozen=True)
 class Corner:
-    """Where two boundaries meet.
+    """Where boundaries meet.
 
     Attributes
     ----------
-    kinds : of the two
+    kinds : of the two, or three
     twist_axis : of the ring
     point : with gamma and moment of the first's state
     """
 
-    kinds: tuple[str, str]
+    kinds: tuple[str, ...]
     twist_axis: str
     point: BoundaryPoint
 

@@ -14,28 +14,17 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import repeat
 from pathlib import Path as File
 
-import numpy as np
-
 from der.files import FilePath, write_whole
-from validation.boundaries import (
-    Boundaries,
-    boundaries,
-    joined,
-    slice_boundaries,
-    slices,
-)
+from validation.boundaries import Boundaries
 from validation.cases import LABELS, PARAMETERS, Case, Row, solve_case
-from validation.edges import Corner, Curve, scanned_boundaries
+from validation.edges import Corner, Curve
 from validation.families import FAMILIES, Family, family
-from validation.gauss import Array
-from validation.polygons import distance
+from validation.following import follow, unexplained
 from validation.rod_check import Compared, Fold, rod_check, table
-from validation.scan import Scan, Solve, scan, solve_all
+from validation.scan import Scan, Solve, scan
 from validation.store import Store
-from validation.workers import Workers
 from validation.workers import workers as started
 
 __all__ = ["FAMILIES", "Diagram", "phase", "run_phase"]
@@ -136,7 +125,7 @@ def phase(
         found = scan(wanted, store, crew, solve=solve, progress=progress)
         clock.append(time.perf_counter())
         cases = _write(folder / "cases.csv", CASE_COLUMNS, map(_case_cells, found.sorted_rows))
-        bounds = _boundaries(found, store, crew, solve)
+        bounds = follow(found, store, crew, solve)
         beside = [row for row in store.rows.values() if wanted.unit(row.case) is not None]
     clock.append(time.perf_counter())
     compared = () if check is None else rod_check(found, check, sample)
@@ -226,49 +215,6 @@ def _made(folder: FilePath) -> File:
     return folder
 
 
-def _boundaries(found: Scan, store: Store, crew: Workers, solve: Solve) -> Boundaries:
-    """Boundaries followed in two parameters; what is solved for on the way is kept, too.
-
-    The slices of a cube are shared out whole.
-    """
-
-    def all_of(cases: Sequence[Case]) -> list[Row]:
-        new = [case for case in dict.fromkeys(cases) if case.key not in store.rows]
-        solve_all(new, store, crew, solve=solve)
-        return [store.rows[case.key] for case in cases]
-
-    if found.family.dimension == 2:
-        return boundaries(found.family, found.sorted_rows, solve=all_of)
-    parts = slices(found.family, found.sorted_rows)
-    known = [[row for row in store.rows.values() if part.has(row.case)] for part in parts]
-    bounds = []
-    for one, rows in crew.executor.map(slice_boundaries, parts, known, repeat(solve)):
-        store.add(rows)
-        bounds.append(one)
-    return joined(bounds)
-
-
-def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
-    """How many edges of the scan's finest cells have no boundary within one and a half cells."""
-    family = found.family
-    lines: dict[str, list[Array]] = {}
-    for curve in curves:
-        places = [family.unit(point.case) for point in curve.points]
-        known = np.array([place for place in places if place is not None])
-        if len(known):
-            lines.setdefault(curve.twist_axis, []).append(known)
-    return sum(
-        min(
-            (distance(np.array(place), line) for line in lines.get(curve.twist_axis, [])),
-            default=math.inf,
-        )
-        > 1.5 / family.finest
-        for curve in scanned_boundaries(found)
-        for point in curve.points
-        if (place := family.unit(point.case)) is not None
-    )
-
-
 # --- Files -----------------------------------------------------------------------------------
 
 
@@ -321,7 +267,8 @@ def _boundary_cells(curves: Iterable[Curve]) -> Iterable[list[str]]:
 def _corner_cells(corner: Corner) -> list[str]:
     point = corner.point
     numbers = map(_number, (point.gamma, point.moment, point.error))
-    return [*corner.kinds, corner.twist_axis, *_values(point.case), *numbers]
+    kinds = corner.kinds[0], " + ".join(corner.kinds[1:])
+    return [*kinds, corner.twist_axis, *_values(point.case), *numbers]
 
 
 def _check_cells(pair: Compared) -> list[str]:

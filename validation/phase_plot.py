@@ -48,6 +48,8 @@ WORDS = {
 LINE = 0.167  # of the legend, inches
 FINER = 4  # pixels between two nodes, at least,
 PIXELS = 512  # and at least so many across
+BETWEEN = 6  # pieces of a line between two points of a curve
+UNSEEN = 10.0  # cells: places are not asked beyond a boundary unless there is no other
 
 
 def save_diagram(
@@ -253,8 +255,26 @@ def _segments(family: Family, sheet: str, curves: Iterable[Curve]) -> Array:
         units = [family.unit(point.case) for point in curve.points]
         at = np.array([(u[0], u[-1]) for u in units if u is not None]) * family.finest
         if curve.twist_axis == sheet and len(at) > 1:
+            at = _smooth(curve.kind, at)
             pieces.append(np.stack([at[:-1], at[1:]], axis=1))
     return np.concatenate(pieces)
+
+
+def _smooth(kind: str, places: Array) -> Array:
+    """A curve through places in order, (n, 2), with more between them.
+
+    Akima's, which does not swing at a kink; what was scanned or bisected is left as it is.
+    """
+    from scipy.interpolate import Akima1DInterpolator
+
+    apart = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    places = places[np.append(True, apart > 1e-9 * apart.max())]
+    if len(places) < 3 or kind.endswith(")"):
+        return places
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    n = np.arange(BETWEEN * (len(places) - 1) + 1) / BETWEEN
+    smooth: Array = Akima1DInterpolator(along, places)(np.interp(n, np.arange(len(along)), along))
+    return smooth
 
 
 def _take_sides(found: Labels, labels: Labels, segments: Array, others: Others) -> None:
@@ -280,8 +300,12 @@ def _take_sides(found: Labels, labels: Labels, segments: Array, others: Others) 
         far = np.linalg.norm(places[:, None] - cases, axis=2)
         far[_crossed(places, cases, segments[near])] = np.inf
         block = found[i * finer : (i + 1) * finer, j * finer : (j + 1) * finer]
-        kept = np.isinf(far.min(axis=1))
-        chosen = np.where(kept, block.ravel(), names[np.argmin(far, axis=1)])
+        hidden = np.isinf(far.min(axis=1))
+        chosen = np.where(hidden, block.ravel(), names[np.argmin(far, axis=1)])
+        if hidden.any() and not hidden.all():  # no case on its side is seen: what lies beside has
+            far = np.linalg.norm(places[hidden, None] - places[~hidden], axis=2)
+            far[_crossed(places[hidden], places[~hidden], segments[near])] += UNSEEN
+            chosen[hidden] = chosen[~hidden][np.argmin(far, axis=1)]
         block[...] = chosen.reshape(block.shape)
 
 
@@ -339,7 +363,10 @@ def _draw_curves(panel: Any, family: Family, curves: Iterable[Curve]) -> None:
     for curve in curves:
         cases = [point.case for point in curve.points]
         x = _across(family, curve.twist_axis, cases)
+        low, high = family.ranges[-1]
+        side = np.array([family.span[1] - family.span[0], high - low])
         y = [case.h_over_t for case in cases]
+        x, y = side[:, None] * _smooth(curve.kind, np.stack([x, y], axis=1) / side).T
         panel.plot(x, y, color=canvas.INK, zorder=3, **_line(curve.kind))
 
 

@@ -10,18 +10,17 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeAlias
 
 from validation.cases import Case, Row, failed, solve_case
 from validation.families import Family
+from validation.jobs import DEATHS, Jobs
 from validation.store import Store
-from validation.workers import Workers, died
+from validation.workers import Workers
 
 Node: TypeAlias = tuple[str, tuple[int, ...]]
 Cell: TypeAlias = tuple[Node, int]
@@ -29,10 +28,7 @@ Solve: TypeAlias = Callable[[Case], Row]
 Batch: TypeAlias = tuple[Case, ...]
 Level: TypeAlias = Callable[[int, int, int], Callable[[int], object] | None]
 
-BATCH = 8  # cases a task: sending one costs as much as a tenth of a case, and a crash loses these
-AHEAD = 2  # tasks a worker that wait or run, so that none is idle
-DEATHS = 2  # of workers, by a case that was solved alone
-IN_VAIN = 8  # deaths of workers in a row with nothing solved between: they cannot work here
+BATCH = 16  # cases a task: sending one costs as much as half a case, and a crash loses these
 
 
 class Interrupted(KeyboardInterrupt):
@@ -217,104 +213,13 @@ def solve_all(
     RuntimeError
         If workers die before they solve anything, or the executor has given up.
     """
-    jobs = _Jobs(crew, solve, cases)
-    while jobs.submit():
-        for rows in jobs.collect():
-            store.add(rows)
-            if tick is not None:
-                tick(len(rows))
-    store.add(jobs.condemned)
-
-
-class _Jobs:
-    """Batches that wait, batches in flight, and suspects: cases whose worker died."""
-
-    def __init__(self, crew: Workers, solve: Solve, cases: Sequence[Case]) -> None:
-        self.condemned: list[Row] = []  # held back until it is known that workers can work at all
-        self._crew = crew
-        self._solve = solve
-        self._waiting = deque(_batches(cases, crew.width))
-        self._flight: dict[Future[list[Row]], Batch] = {}
-        self._suspects: deque[Case] = deque()
-        self._tried: Case | None = None  # the suspect in flight, alone
-        self._deaths: Counter[Case] = Counter()
-        self._in_vain = 0
-
-    def submit(self) -> bool:
-        """Hand out what can be; whether anything is in flight."""
-        room = AHEAD * self._crew.width
-        while (batch := self._next(room)) is not None:
-            try:
-                self._flight[self._crew.executor.submit(_solve_batch, self._solve, batch)] = batch
-            except Exception as problem:
-                if not died(problem):
-                    raise
-                self._lose(batch)
-                self._mend()
-        return bool(self._flight)
-
-    def collect(self) -> Iterator[list[Row]]:
-        """Wait, and give the rows of all batches that are finished."""
-        done = wait(self._flight, return_when=FIRST_COMPLETED).done
-        if any(_lost(task) for task in done):  # the pool is gone, and all in flight with it
-            done = wait(self._flight).done
-        broken = False
-        for task in done:
-            batch = self._flight.pop(task)
-            if _lost(task):
-                self._lose(batch)
-                broken = True
-                continue
-            rows = task.result()
-            self._tried, self._in_vain = None, 0
-            yield [*self.condemned, *rows]
-            self.condemned = []
-        if broken:
-            self._mend()
-
-    def _next(self, room: int) -> Batch | None:
-        """What can be handed out next: a suspect only when nothing else is in flight."""
-        if self._suspects:
-            if self._flight:
-                return None
-            self._tried = self._suspects.popleft()
-            return (self._tried,)
-        if self._waiting and self._tried is None and len(self._flight) < room:
-            return self._waiting.popleft()
-        return None
-
-    def _lose(self, batch: Batch) -> None:
-        """Take note of a batch whose worker died."""
-        if self._tried is None:
-            self._suspects.extend(batch)
-            return
-        case, self._tried = self._tried, None
-        self._deaths[case] += 1
-        if self._deaths[case] < DEATHS:
-            self._suspects.appendleft(case)
-        else:
-            why = f"its worker died, {DEATHS} times"
-            self.condemned.append(failed(case, why))
-
-    def _mend(self) -> None:
-        self._in_vain += 1
-        if self._in_vain >= IN_VAIN:
-            raise RuntimeError("workers die before they have solved anything")
-        self._crew.restart()
-
-
-def _lost(task: Future[list[Row]]) -> bool:
-    """Whether a finished task's worker died.
-
-    Raises
-    ------
-    RuntimeError
-        If the executor has taken the task back.
-    """
-    if task.cancelled():
-        raise RuntimeError("the scheduler has gone, or has taken tasks back")
-    problem = task.exception()
-    return problem is not None and died(problem)
+    work = partial(_solve_batch, solve)
+    for batch, rows in Jobs(crew, work, _batches(cases, crew.width)).done():
+        if rows is None:
+            rows = [failed(case, f"its worker died, {DEATHS} times") for case in batch]
+        store.add(rows)
+        if tick is not None:
+            tick(len(batch))
 
 
 def _batches(cases: Sequence[Case], width: int) -> list[Batch]:

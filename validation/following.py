@@ -1,0 +1,107 @@
+"""The boundaries of a scanned diagram, followed by workers that may die."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from validation.boundaries import (
+    Boundaries,
+    Slice,
+    boundaries,
+    joined,
+    slice_boundaries,
+    slices,
+)
+from validation.cases import Case, Row
+from validation.edges import Curve, scanned_boundaries
+from validation.gauss import Array
+from validation.jobs import Jobs
+from validation.polygons import distance
+from validation.scan import Scan, Solve, solve_all
+from validation.store import Store
+from validation.workers import Workers
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A slice of a cube and its rows; no two are equal."""
+
+    part: Slice
+    known: tuple[Row, ...]
+
+
+def follow(found: Scan, store: Store, crew: Workers, solve: Solve) -> Boundaries:
+    """Boundaries followed in two parameters; what is solved for on the way is kept, too.
+
+    The slices of a cube are shared out whole. One that ends its workers has the boundaries that the
+    scan sees there.
+
+    Raises
+    ------
+    OSError
+        If a row cannot be written.
+    RuntimeError
+        If workers die before they have done anything, or the executor has given up.
+    """
+
+    def all_of(cases: Sequence[Case]) -> list[Row]:
+        new = [case for case in dict.fromkeys(cases) if case.key not in store.rows]
+        solve_all(new, store, crew, solve=solve)
+        return [store.rows[case.key] for case in cases]
+
+    if found.family.dimension == 2:
+        return boundaries(found.family, found.sorted_rows, solve=all_of)
+    tasks = [
+        _Task(part, tuple(row for row in store.rows.values() if part.has(row.case)))
+        for part in slices(found.family, found.sorted_rows)
+    ]
+    parts: dict[_Task, Boundaries] = {}
+    for (task,), followed in Jobs(crew, partial(_follow, solve), [(t,) for t in tasks]).done():
+        if followed is None:
+            parts[task] = _scanned(found, task.part)
+        else:
+            parts[task], rows = followed
+            store.add(rows)
+    return joined(parts[task] for task in tasks)
+
+
+def _follow(solve: Solve, batch: tuple[_Task, ...]) -> tuple[Boundaries, list[Row]]:
+    """What a worker does."""
+    (task,) = batch
+    return slice_boundaries(task.part, task.known, solve)
+
+
+def _scanned(found: Scan, part: Slice) -> Boundaries:
+    """The boundaries of a slice as the scan sees them."""
+    curves = [
+        curve
+        for curve in scanned_boundaries(found)
+        if curve.twist_axis == part.sheet and all(part.has(point.case) for point in curve.points)
+    ]
+    return Boundaries(curves, [])
+
+
+def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
+    """How many edges of the scan's finest cells have no boundary within one and a half cells."""
+    family = found.family
+    lines: dict[str, list[Array]] = {}
+    for curve in curves:
+        places = [family.unit(point.case) for point in curve.points]
+        known = np.array([place for place in places if place is not None])
+        if len(known):
+            lines.setdefault(curve.twist_axis, []).append(known)
+    return sum(
+        min(
+            (distance(np.array(place), line) for line in lines.get(curve.twist_axis, [])),
+            default=math.inf,
+        )
+        > 1.5 / family.finest
+        for curve in scanned_boundaries(found)
+        for point in curve.points
+        if (place := family.unit(point.case)) is not None
+    )
