@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from der.film import Playback
@@ -17,6 +17,8 @@ WORDS = {
     "snap": "snap",
     "contact": "self-crossing",
 }
+SOLVERS = {"der": "rod", "bvp": "boundary-value problem"}
+STAYS = 0.12  # of a film: how long it is said that a special point was passed
 
 
 def in_words(point: Point) -> str:
@@ -38,31 +40,67 @@ def title(path: Path, film: Playback) -> str:
 
 
 def names(paths: Sequence[Path]) -> list[str]:
-    """A few words for each of several paths, that tell them apart: what differs between them."""
+    """A few words for each of several paths, that tell them apart.
+
+    All that differs in what is solved and how; of the other numerics as much as that takes.
+    """
     said = [
-        {"shape": path.ring["shape"], **path.ring, **path.section, **path.numerics}
-        | {"solver": {"der": "rod", "bvp": "boundary-value problem"}[path.solver]}
+        {**path.ring, **path.section, **path.numerics}
+        | {"shape": str(path.ring["shape"]), "solver": _solver(path, paths)}
         for path in paths
     ]
     words = [
-        f"{s['shape']}, h/t = {s['h_over_t']:.4g}" if s.get("h_over_t") else str(s["shape"])
+        f"{s['shape']}, h/t = {s['h_over_t']:.4g}" if s.get("h_over_t") else f"{s['shape']}"
         for s in said
     ]
     if len(paths) == 1:
         return words
-    for name in sorted({name for one in said for name in one} - {"shape", "h_over_t", "version"}):
-        values = [one.get(name) for one in said]
-        if len(set(words)) == len(words):
-            break
-        if all(isinstance(v, str | int | float) for v in values) and len(set(values)) > 1:
-            label = "" if name == "solver" else f"{name.replace('_over_', '/').replace('_', ' ')} "
-            words = [
-                f"{w}, {label}{v:.4g}" if isinstance(v, float) else f"{w}, {label}{v}"
-                for w, v in zip(words, values, strict=True)
-            ]
+    done = {"shape", "h_over_t", "version"}
+    if all(one.get("h_over_t") for one in said):
+        done |= {"alpha", "beta"}  # these follow
+    first = sorted({name for path in paths for name in path.ring} - {"twist_axis"})
+    first += ["twist_axis", "alpha", "beta", "nu", "solver", "control"]
+    for name in [name for name in first if name not in done]:
+        words = _told(words, said, name)
+    for name in sorted({name for one in said for name in one} - done - set(first)):
+        if len(set(words)) < len(words):
+            words = _told(words, said, name)
     if len(set(words)) < len(words):
         words = [f"{word} ({k})" for k, word in enumerate(words, 1)]
     return words
+
+
+def _solver(path: Path, paths: Sequence[Path]) -> str:
+    """What solved a path; of rods alone, how."""
+    method = path.numerics.get("solver")
+    if method is not None and all(one.solver == "der" for one in paths):
+        return f"{SOLVERS['der']} by {method}"
+    return SOLVERS[path.solver]
+
+
+def _told(words: Sequence[str], said: Sequence[Mapping[str, object]], name: str) -> list[str]:
+    """Words with a parameter put after them, where paths differ in it."""
+    values = [one.get(name) for one in said]
+    if name == "natural_curvature" and None in values:  # other shapes have none: 1 goes unsaid
+        values = [None if value == 1.0 else value for value in values]
+    if all(value == values[0] for value in values):
+        return list(words)
+    return [
+        f"{word}, {_parameter(name, value)}" if isinstance(value, str | int | float) else word
+        for word, value in zip(words, values, strict=True)
+    ]
+
+
+def _parameter(name: str, value: str | float) -> str:
+    """One parameter as it stands in a title."""
+    if name == "twist_axis":
+        return f"about {value}"
+    if name == "solver":
+        return str(value)
+    label = name.replace("_over_", "/").replace("_", " ")
+    if isinstance(value, bool):
+        return label if value else f"no {label}"
+    return f"{label} {value:.4g}" if isinstance(value, float) else f"{label} {value}"
 
 
 @dataclass(frozen=True)
@@ -72,15 +110,25 @@ class Caption:
     numbers: str  # gamma, M and U
     stability: str  # how many ways down, or that the ring falls; "" where nothing is known
     stable: bool | None  # None: not known
-    event: str  # the special point that was passed last; "" before the first
+    event: str  # the special point that was just passed; "" a little after it
+    way: str = ""  # "loading" or "unloading", where the ring is also unloaded
+
+    @property
+    def line(self) -> str:
+        """Way and stability in one."""
+        return ", ".join(part for part in (self.way, self.stability) if part)
 
 
 def captions(path: Path, film: Playback) -> list[Caption]:
     """What is said of every step, also of one between two states."""
     index = path.index.tolist()
+    stays = max(1, round(STAYS * len(film.x)))
+    turn = _turned_back(path)
     steps = [(film.step_of(point.position), point) for point in path.points]
     said = []
+    reached = -1
     for step, k in enumerate(film.position.tolist()):
+        reached = max(reached, k)
         gamma, energy, moment = film.gamma[step], film.energy[step], film.moment[step]
         moment_too = "" if math.isnan(moment) else f"M = {_shown(moment)}   "
         numbers = f"{GAMMA} = {_shown(gamma / math.pi)} π   {moment_too}U = {_shown(energy)}"
@@ -91,13 +139,25 @@ def captions(path: Path, film: Playback) -> list[Caption]:
             words = "the ring snaps (slow motion)"
         else:
             words = "" if ways is None else "stable" if ways == 0 else f"unstable, index {ways}"
-        passed = [point for at, point in steps if at <= step]
+        passed = [point for at, point in steps if at <= step < at + stays]
         event = ""
         if passed:
             last = passed[-1]
             event = f"{WORDS[last.kind]} at {GAMMA} = {last.gamma / math.pi:.4f} π"
-        said.append(Caption(numbers, words, None if ways is None else ways == 0, event))
+        way = ""
+        if turn is not None:
+            way = "loading" if reached < turn else "unloading"
+        said.append(Caption(numbers, words, None if ways is None else ways == 0, event, way))
     return said
+
+
+def _turned_back(path: Path) -> int | None:
+    """Position of the state at which unloading begins; None for a path that is not unloaded."""
+    if not path.numerics.get("unload"):
+        return None
+    driven = path.moment if path.numerics.get("control") == "moment" else path.gamma
+    turn = int(driven.argmax())
+    return turn if turn < len(path) - 1 else len(path)  # interrupted before
 
 
 def _shown(value: float) -> str:

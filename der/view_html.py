@@ -133,7 +133,7 @@ def _ring(path: Path, film: Playback, name: str, colour: str) -> dict[str, Any]:
         "moment": packed(film.moment, "f8"),
         "energy": packed(film.energy, "f8"),
         "numbers": [one.numbers for one in said],
-        "stability": [one.stability for one in said],
+        "stability": [one.line for one in said],
         "stable": [one.stable for one in said],
         "events": [one.event for one in said],
         "marks": sorted({film.step_of(point.position) for point in path.points}),

@@ -27,7 +27,9 @@ from der.view_style import (
     UNSTABLE,
     blank,
     dress,
+    legend_below,
     seen,
+    sure,
     title,
 )
 
@@ -99,7 +101,7 @@ def figure_of_landscape(landscape: Landscape) -> Figure:
         for kind, (label, marker, face) in RESTS.items()
         if kind in kinds
     ]
-    _legend(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -126,10 +128,11 @@ def _fold_barrier(panel: Axes, landscape: Landscape) -> None:
         panel.set_title(text, fontsize=7.5, color=QUIET, loc="left", wrap=True)
         return
     saddle, flat = landscape.rests[found.saddle], landscape.rests[0]
-    x = 0.1
+    x = 0.05
     _level(panel, saddle.energy, (0.0, saddle.gamma / math.pi))
     _arrow(panel, x, flat.energy, saddle.energy)
-    _say(panel, (x, flat.energy + 0.72 * found.fold), f"to fold\n{found.fold:.4g}", (7.0, 0.0))
+    text = _height("fold", found.fold, landscape.extrapolated)
+    _say(panel, (x, flat.energy + 0.74 * found.fold), text, (7.0, 0.0))
 
 
 def _saddle_and_well(panel: Axes, landscape: Landscape) -> None:
@@ -142,13 +145,14 @@ def _saddle_and_well(panel: Axes, landscape: Landscape) -> None:
     _rests(panel, landscape.rests, path.energy)
     span = (end.gamma - saddle.gamma) / math.pi
     x = end.gamma / math.pi + 0.12 * span
-    panel.set_xlim(saddle.gamma / math.pi - 0.75 * span, end.gamma / math.pi + 0.45 * span)
+    room = 1.15 if "open" in landscape.extrapolated else 0.6  # for words beside the arrow
+    panel.set_xlim(saddle.gamma / math.pi - 0.75 * span, end.gamma / math.pi + room * span)
     panel.set_ylim(end.energy - 0.7 * found.open, saddle.energy + 0.45 * found.open)
     _level(panel, saddle.energy, (saddle.gamma / math.pi, x))
     _level(panel, end.energy, (end.gamma / math.pi, x))
     _arrow(panel, x, end.energy, saddle.energy)
     middle = 0.5 * (end.energy + saddle.energy)
-    _say(panel, (x, middle), f"to open\n{found.open:.4g}", (6.0, 0.0))
+    _say(panel, (x, middle), _height("open", found.open, landscape.extrapolated), (6.0, 0.0))
     for rest, name, away in ((saddle, "saddle", 11.0), (end, "folded", -16.0)):
         ways = "?" if rest.index_free is None else rest.index_free
         text = f"{name}\n$\\gamma$ = {rest.gamma / math.pi:.4f} $\\pi$\nways down alone: {ways}"
@@ -212,7 +216,7 @@ def figure_of_barriers(curves: BarrierCurves) -> Figure:
     below.xaxis.set_major_locator(FixedLocator(ticks))
     below.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     below.set_xlabel("height over thickness of the section  $h/t$", fontsize=9, color=INK)
-    _legend(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -252,7 +256,7 @@ def figure_of_surface(surface: Surface) -> Figure:
     bar.ax.tick_params(labelsize=7.5, color=QUIET, labelcolor=INK)
     bar.outline.set_visible(False)
     _relief(figure, surface, ceiling, norm)
-    _legend(figure, handles)
+    legend_below(figure, handles)
     return figure
 
 
@@ -367,9 +371,11 @@ def figure_of_pass(found: Pass) -> Figure:
         raise ValueError(f"pass must have a saddle to be plotted: {found.why}")
     figure = blank((7.6, 5.0))
     figure.text(0.5, 0.965, title(found.ring, found.section, found.numerics), **TITLE)
-    panel = figure.add_axes((0.085, 0.115, 0.895, 0.53))
+    panel = figure.add_axes((0.085, 0.165, 0.895, 0.5))
     panel.margins(x=0.11)
     progress, energy = found.way.T
+    span = float(np.ptp(energy))
+    panel.set_ylim(float(energy.min()) - 0.05 * span, float(energy.max()) + 0.5 * span)  # words
     top = int(np.argmax(energy))
     panel.plot(progress, energy, color=STABLE, linewidth=1.7, zorder=2)
     ends = ((0, "well"), (top, "saddle"), (len(energy) - 1, "well"))
@@ -381,7 +387,15 @@ def figure_of_pass(found: Pass) -> Figure:
         "way down both sides of the saddle  [rad, root mean square]", fontsize=9, color=INK
     )
     _annotate_pass(panel, found, float(progress[top]))
-    row = figure.add_axes((0.085, 0.675, 0.895, 0.25))
+    legend_below(
+        figure,
+        [
+            Line2D([], [], color=STABLE, linewidth=1.7, label="way of least energy"),
+            Line2D([], [], label="well: flat, folded", **_mark("o", INK)),
+            Line2D([], [], label="saddle", **_mark("^", "white")),
+        ],
+    )
+    row = figure.add_axes((0.085, 0.69, 0.895, 0.24))
     low, high = panel.get_xlim()
     row.set_xlim(low, high)
     _rings(row, found)
@@ -395,16 +409,23 @@ def _annotate_pass(panel: Axes, found: Pass, at: float) -> None:
     if saddle is None or found.fold is None or found.open is None:
         return
     kind = "the saddle of twisting" if saddle.twisted else "a saddle beside that of twisting"
-    lines = [
-        f"{kind}, ways down: {saddle.index}",
-        f"to fold {found.fold:.5g}   (twisting {_number(found.twisting.fold)})",
-        f"to open {found.open:.5g}   (twisting {_number(found.twisting.open)})",
-    ]
+    lines = [f"{kind}, ways down: {'?' if saddle.index is None else saddle.index}"]
+    for name, value, twisting in (
+        ("fold", found.fold, found.twisting.fold),
+        ("open", found.open, found.twisting.open),
+    ):
+        text = f"{value:.5g} GJ/a"
+        if name in found.extrapolated:
+            text = f"{sure(*found.extrapolated[name])} GJ/a, extrapolated (mesh {value:.5g})"
+        lines.append(f"to {name}: {text}")
+        mesh = " (mesh)" if name in found.extrapolated else ""
+        other = "no barrier" if twisting is None else f"{twisting:.5g} GJ/a{mesh}"
+        lines.append(f"      in clamped grips, by twisting: {other}")
     panel.text(
-        0.03, 0.95, "\n".join(lines), transform=panel.transAxes, va="top", fontsize=8, color=INK
+        0.03, 0.975, "\n".join(lines), transform=panel.transAxes, va="top", fontsize=8, color=INK
     )
     progress, energy = found.way.T
-    inset = panel.inset_axes((0.6, 0.1, 0.27, 0.48))
+    inset = panel.inset_axes((0.61, 0.08, 0.26, 0.4))
     end = float(progress[-1])
     inset.plot(progress, energy, color=STABLE, linewidth=1.4)
     inset.set_xlim(at - 0.8 * (end - at), end + 0.1 * (end - at))
@@ -437,8 +458,12 @@ def _rings(row: Axes, found: Pass) -> None:
 # --- Pieces ----------------------------------------------------------------------------------
 
 
-def _number(value: float | None) -> str:
-    return "none" if value is None else f"{value:.5g}"
+def _height(name: str, mesh: float, known: Mapping[str, tuple[float, float]]) -> str:
+    """A barrier in words: extrapolated where that was done, and then that of the curve, too."""
+    if name not in known:
+        return f"to {name}\n{mesh:.4g} GJ/a"
+    value, _, error = sure(*known[name]).partition(" ")
+    return f"to {name}\n{value}\n{error} GJ/a\nextrapolated\n(mesh {mesh:.5g})"
 
 
 def _mark(marker: str, face: str) -> dict[str, Any]:
@@ -472,19 +497,4 @@ def _say(panel: Axes, place: tuple[float, float], text: str, away: tuple[float, 
         color=INK,
         path_effects=HALO,
         zorder=6,
-    )
-
-
-def _legend(figure: Figure, handles: list[Any]) -> None:
-    figure.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 0.005),
-        ncols=min(len(handles), 7),
-        frameon=False,
-        fontsize=8,
-        handlelength=2.4,
-        columnspacing=1.7,
-        handletextpad=0.5,
-        labelcolor=INK,
     )

@@ -10,6 +10,7 @@ import math
 import shutil
 import subprocess
 import tempfile
+import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path as File
 from typing import Any
@@ -22,6 +23,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import Bbox
 
 from der.captions import captions, names
 from der.checks import Array
@@ -38,7 +40,6 @@ CODEC = "libx264"  # of an MP4
 FPS = 15
 FRAMES = 105  # and what special points add: seven seconds
 REST = 0.8  # seconds that the first and the last picture stay
-SHOWN = 1.2  # seconds that an event stays in the caption
 INK, QUIET, PALE = "#222222", "#8a8a8a", "#d9d9d9"
 STABLE, UNSTABLE, FALLING = "#0072B2", "#D55E00", "#8a8a8a"  # Okabe and Ito
 STRETCHES: dict[bool | str | None, tuple[str, str, Any]] = {
@@ -137,17 +138,18 @@ class _Screen(Figure):
 class _Ring:
     """One ring on the stage: what moves in its picture and in both panels."""
 
-    def __init__(
-        self, path: Path, film: Playback, colour: str, fps: int, panels: Sequence[Axes]
-    ) -> None:
+    def __init__(self, path: Path, film: Playback, colour: str, panels: Sequence[Axes]) -> None:
         self.film = film
         self.said = captions(path, film)
         self.pointers = grips(film, POINTER, ARC)
         self.width = HALF_WIDTH * film.size
-        self.linger = round(SHOWN * fps)
-        self.events = {film.step_of(point.position) for point in path.points}
         self.ribbon: Any = PolyCollection([], linewidths=0.5)
-        look: dict[str, Any] = {"color": INK, "linewidth": 1.1, "solid_capstyle": "round"}
+        look: dict[str, Any] = {
+            "color": INK,
+            "linewidth": 1.1,
+            "solid_capstyle": "round",
+            "clip_on": False,
+        }
         self.arrows = [Line2D([], [], **look) for _ in range(2)]
         self.dots = [
             panel.plot(
@@ -201,15 +203,11 @@ class _Ring:
         for dot, value in zip(self.dots, (film.moment[step], film.energy[step]), strict=True):
             dot.set_data([film.gamma[step] / math.pi], [value])
             yield dot
-        event = said.event if self._recent(step) else ""
         colour = {True: STABLE, False: UNSTABLE, None: QUIET}[said.stable]
         self.words[1].set_color(colour)
-        for text, words in zip(self.words, (said.numbers, said.stability, event), strict=True):
+        for text, words in zip(self.words, (said.numbers, said.line, said.event), strict=True):
             text.set_text(words)
             yield text
-
-    def _recent(self, step: int) -> bool:
-        return any(step - self.linger < at <= step for at in self.events)
 
 
 class _Stage:
@@ -225,9 +223,9 @@ class _Stage:
         called = names(paths)
         self.rings = []
         for path, film, row, colour, name in zip(paths, films, rows, colours, called, strict=True):
-            ring = _Ring(path, film, colour, fps, panels)
+            ring = _Ring(path, film, colour, panels)
             box = row.get_position(original=True)
-            self._say(ring, box.x0 + 0.5 * box.width, name, colour if two else INK)
+            self._say(ring, box, name, colour if two else INK)
             for panel, height in zip(panels, (path.moment, path.energy), strict=True):
                 _draw(panel, path, height, colour if two else None)
             self.rings.append(ring)
@@ -255,10 +253,17 @@ class _Stage:
             add((0.575, 0.155, 0.405, 0.235)),
         ]
 
-    def _say(self, ring: _Ring, x: float, name: str, colour: str) -> None:
-        """The lines above a ring: its name, and those that change."""
+    def _say(self, ring: _Ring, box: Bbox, name: str, colour: str) -> None:
+        """The lines above a ring: its name, in the size that fits, and those that change."""
         look: dict[str, Any] = {"ha": "center", "va": "center"}
-        self.figure.text(x, 0.955, name, fontsize=10, color=colour, fontweight="bold", **look)
+        x = box.x0 + 0.5 * box.width
+        head = self.figure.text(x, 0.955, name, color=colour, fontweight="bold", **look)
+        head.set_fontsize(10)
+        room = box.width * self.figure.bbox.width / head.get_window_extent().width
+        if room < 1.0:  # a long name takes two lines
+            head.set_text("\n".join(textwrap.wrap(name, -(-len(name) // 2) + 6)))
+            room = box.width * self.figure.bbox.width / head.get_window_extent().width
+            head.set(fontsize=min(8.5, 10.0 * room), y=0.96, linespacing=1.05)
         ring.words = [
             self.figure.text(x, 0.905, "", fontsize=9.5, color=INK, **look),
             self.figure.text(x, 0.862, "", fontsize=9, color=INK, **look),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,20 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from der.checks import Array
-from der.landscape_push_record import KINDS, LeastPush, Push
-from der.view_style import FREE, INK, STABLE, TITLE, UNSTABLE, blank, dress, seen, title
+from der.landscape_push_record import ALIKE, KINDS, LeastPush, Push
+from der.view_style import (
+    FREE,
+    INK,
+    STABLE,
+    TITLE,
+    UNSTABLE,
+    blank,
+    dress,
+    legend_below,
+    seen,
+    sure,
+    title,
+)
 
 COLOURS = {"force": STABLE, "couple": UNSTABLE}
 AXES = {
@@ -31,10 +44,12 @@ RINGS = (
 EVENTS = {
     "pass": "carried to a pass",
     "fold": "snaps at a fold",
-    "branch": "snaps at a branch",
-    "limit": "limit of the load",
-    "end": "end",
+    "branch": "snaps at a branch point",
+    "limit": "limit of a dead load",
+    "end": "end of the march",
 }
+MARKS = {"pass": "^", "fold": "D", "branch": "s", "limit": "v", "end": "X"}
+DASHES = (0, (3.5, 1.6))  # of a push whose dead load is the best
 ARROW = 0.15  # length of an arrow
 WIDE, HIGH = 1.0, 0.5  # of a little picture, in its own units
 
@@ -49,36 +64,47 @@ def figure_of_push(found: LeastPush) -> Figure:
     """
     if not found.least:
         raise ValueError(f"push must open the ring to be plotted: {found.why}")
-    figure = blank((9.2, 6.5))
-    figure.text(0.5, 0.975, title(found.ring, found.section, found.numerics), **TITLE)
-    _rings(figure.add_axes((0.01, 0.655, 0.98, 0.3)), found)
+    figure = blank((9.2, 6.9))
+    figure.text(0.5, 0.977, title(found.ring, found.section, found.numerics), **TITLE)
+    _rings(figure.add_axes((0.01, 0.665, 0.98, 0.295)), found)
     kinds = [kind for kind in KINDS if kind in found.least]
-    places = {1: [(0.13, 0.45)], 2: [(0.415, 0.2), (0.105, 0.2)]}[len(kinds)]
+    places = {1: [(0.17, 0.43)], 2: [(0.435, 0.195), (0.145, 0.195)]}[len(kinds)]
     for kind, (low, high) in zip(kinds, places, strict=True):
         _curves(figure.add_axes((0.07, low, 0.31, high)), found, kind)
-    _works(figure.add_axes((0.64, 0.155, 0.345, 0.46)), found)
-    handles: list[Any] = [
-        *(Patch(color=COLOURS[kind], alpha=0.75, label=f"slow {kind}") for kind in kinds),
-        Line2D([], [], color=FREE, linewidth=1.5, label="barrier of the ring left alone"),
-        Line2D([], [], label="let go", **_mark("^")),
-        Line2D([], [], label="limit of a dead load", **_mark("v")),
-        Line2D(
-            [], [], marker="|", markersize=9, linestyle="none", color=INK, label="its work so far"
-        ),
-    ]
-    figure.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 0.003),
-        ncols=len(handles),
-        frameon=False,
-        fontsize=8,
-        handlelength=1.5,
-        columnspacing=1.7,
-        handletextpad=0.5,
-        labelcolor=INK,
-    )
+    rows = {kind: _ranked(found, kind) for kind in kinds}
+    _works(figure.add_axes((0.64, 0.165, 0.345, 0.465)), found, rows)
+    legend_below(figure, _handles(found, rows))
     return figure
+
+
+def _handles(found: LeastPush, rows: Mapping[str, list[Push]]) -> list[Any]:
+    """What colours, lines and marks mean, of those that are there."""
+    handles: list[Any] = []
+    for kind, ranked in rows.items():
+        n = len(ranked)
+        count = f"best {MOST} of {n}" if n > MOST else f"all {n}"
+        label = f"slow {kind}, {count} that open it"
+        handles.append(Patch(color=COLOURS[kind], alpha=0.75, label=label))
+    handles.append(Line2D([], [], color="#bdbdbd", linewidth=0.8, label="others that open it"))
+    if any(_dashed(found, kind) for kind in rows):
+        look: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": DASHES}
+        handles.append(Line2D([], [], label="push of the best dead load", **look))
+    if found.barrier is not None:
+        mesh = " (mesh)" if found.extrapolated else ""
+        label = f"barrier of the ring left alone, {found.barrier:.4g} GJ/a{mesh}"
+        handles.append(Line2D([], [], color=FREE, linewidth=1.5, label=label))
+    events = {found.pushes[k].held.event for k in found.least.values()}
+    events |= {dead.event for k in found.least_dead.values() if (dead := found.pushes[k].dead)}
+    handles += [
+        Line2D([], [], label=label, **_mark(event))
+        for event, label in EVENTS.items()
+        if event in events
+    ]
+    if any(one.dead and one.opens_dead for ranked in rows.values() for one in ranked[:MOST]):
+        label = "work of the dead load when it gets away"
+        tick: dict[str, Any] = {"marker": "|", "markersize": 9, "linestyle": "none", "color": INK}
+        handles.append(Line2D([], [], label=label, **tick))
+    return handles
 
 
 # --- Rings -----------------------------------------------------------------------------------
@@ -108,8 +134,8 @@ def _rings(row: Axes, found: LeastPush) -> None:
         _arrows(row, ends[:2], ends[2:] - ends[:2], double=kind == "couple")
         row.text(
             i * WIDE,
-            -0.5 * HIGH,
-            _caption(push, dead=dead),
+            -0.5 * HIGH - 0.07,
+            _caption(found, push, name),
             ha="center",
             va="top",
             fontsize=7.5,
@@ -117,7 +143,7 @@ def _rings(row: Axes, found: LeastPush) -> None:
             linespacing=1.35,
         )
     row.set_xlim(-0.5 * WIDE, (len(shown) - 0.5) * WIDE)
-    row.set_ylim(-0.5 * HIGH - 0.24, 0.5 * HIGH + 0.04)
+    row.set_ylim(-0.5 * HIGH - 0.36, 0.5 * HIGH + 0.04)
     row.set_aspect("equal")
     row.set_axis_off()
 
@@ -164,10 +190,17 @@ def _arrows(row: Axes, at: Array, way: Array, *, double: bool) -> None:
             )
 
 
-def _caption(push: Push, *, dead: bool) -> str:
+def _caption(found: LeastPush, push: Push, name: str) -> str:
+    """What is pushed where, how it ends and its work: without mesh where that is known."""
+    dead = name.endswith("dead")
     moment = push.dead if dead and push.dead is not None else push.held
+    work = f"work {moment.work:.4g} GJ/a"
+    if name in found.extrapolated:
+        work = f"work {sure(*found.extrapolated[name])} GJ/a\nextrapolated (mesh {moment.work:.4g})"
+    elif found.extrapolated:
+        work += " (mesh)"
     first = f"{'dead' if dead else 'slow'} {push.kind}, {push.direction}"
-    return f"{first}\n{_points(push)}\n{EVENTS[moment.event]}, work {moment.work:.4g}"
+    return f"{first}\n{_points(push)}\n{EVENTS[moment.event]}\n{work}"
 
 
 def _points(push: Push) -> str:
@@ -188,18 +221,13 @@ def _curves(panel: Axes, found: LeastPush, kind: str) -> None:
     panel.margins(x=0.02)
     push = found.pushes[best]
     top = 2.2 * max(push.peak, found.pushes[dead].peak if dead is not None else 0.0)
-    if dead is not None and dead != best:
-        panel.plot(
-            *_line(found.pushes[dead]),
-            color=COLOURS[kind],
-            linewidth=1.1,
-            linestyle=(0, (3.5, 1.6)),
-            zorder=3,
-        )
+    if dead is not None and _dashed(found, kind):
+        look: dict[str, Any] = {"color": COLOURS[kind], "linewidth": 1.1, "linestyle": DASHES}
+        panel.plot(*_line(found.pushes[dead]), zorder=3, **look)
     panel.plot(*_line(push), color=COLOURS[kind], linewidth=1.8, zorder=4)
-    panel.plot(push.held.push, push.held.load, zorder=6, clip_on=False, **_mark("^"))
+    panel.plot(push.held.push, push.held.load, zorder=6, clip_on=False, **_mark(push.held.event))
     if dead is not None and (limit := found.pushes[dead].dead) is not None:
-        panel.plot(limit.push, limit.load, zorder=6, **_mark("v"))
+        panel.plot(limit.push, limit.load, zorder=6, **_mark(limit.event))
     panel.set_ylim(0.0, top)
     widest = 1.7 * max(push.held.push, found.pushes[dead].held.push if dead is not None else 0.0)
     panel.set_xlim(0.0, widest)
@@ -208,6 +236,11 @@ def _curves(panel: Axes, found: LeastPush, kind: str) -> None:
     panel.set_xlabel(across, fontsize=9, color=INK, labelpad=2)
     panel.xaxis.set_major_locator(MaxNLocator(6))
     panel.yaxis.set_major_locator(MaxNLocator(5))
+
+
+def _dashed(found: LeastPush, kind: str) -> bool:
+    """Whether the best dead load is that of another push than the best slow one."""
+    return found.least_dead.get(kind, found.least[kind]) != found.least[kind]
 
 
 def _line(push: Push) -> tuple[Array, Array]:
@@ -222,11 +255,12 @@ def _line(push: Push) -> tuple[Array, Array]:
     return fine, through(x, load)(fine)
 
 
-def _mark(marker: str) -> dict[str, Any]:
+def _mark(event: str) -> dict[str, Any]:
+    """How an event is marked."""
     return {
         "linestyle": "none",
-        "marker": marker,
-        "markersize": 6.2,
+        "marker": MARKS[event],
+        "markersize": 5.2 if event in ("fold", "branch") else 6.2,
         "markerfacecolor": "white",
         "markeredgecolor": INK,
         "markeredgewidth": 0.9,
@@ -236,18 +270,19 @@ def _mark(marker: str) -> dict[str, Any]:
 # --- Works -----------------------------------------------------------------------------------
 
 
-def _works(panel: Axes, found: LeastPush) -> None:
-    """Works of the best pushes as bars, and what dead loads have done at their limits."""
-    rows: list[Push] = []
-    for kind in KINDS:
-        opening = [one for one in found.pushes if one.kind == kind and one.opens]
-        rows += sorted(opening, key=_rank)[:MOST]
+def _works(panel: Axes, found: LeastPush, ranked: Mapping[str, list[Push]]) -> None:
+    """Works of the best pushes as bars, and what dead loads have done when they get away."""
+    rows = [one for of_kind in ranked.values() for one in of_kind[:MOST]]
     place = np.arange(len(rows))[::-1].astype(float)
     place[: sum(one.kind == "force" for one in rows)] += 0.6
     for y, one in zip(place, rows, strict=True):
         panel.barh(y, one.held.work, height=0.66, color=COLOURS[one.kind], alpha=0.75, linewidth=0)
         if one.dead is not None and one.opens_dead:
             panel.plot(one.dead.work, y, marker="|", markersize=9, color=INK, zorder=4)
+            continue
+        text = "no limit of a dead load" if one.dead is None else "a dead load does not open it"
+        say: dict[str, Any] = {"xytext": (4.0, 0.0), "textcoords": "offset points"}
+        panel.annotate(text, (0.0, y), va="center_baseline", fontsize=6.5, color="white", **say)
     panel.set_yticks(place, [f"{_points(one)}  {one.direction}" for one in rows])
     panel.tick_params(axis="y", length=0)
     if found.barrier is not None:
@@ -263,5 +298,18 @@ def _works(panel: Axes, found: LeastPush) -> None:
     panel.set_axisbelow(True)
 
 
-def _rank(one: Push) -> tuple[float, int, float]:
-    return round(one.held.work, 5), one.falls, one.peak
+def _ranked(found: LeastPush, kind: str) -> list[Push]:
+    """Pushes of a kind that open the ring, by work; of those that take the same the best first.
+
+    The others of these in the order of falls on the way, places and directions.
+    """
+    best = found.pushes[found.least[kind]]
+    opening = [one for one in found.pushes if one.kind == kind and one.opens]
+    opening.sort(key=lambda one: one.held.work)
+    group, start = [], -math.inf
+    for one in opening:
+        if one.held.work > (1.0 + ALIKE) * start:
+            start = one.held.work
+        group.append((start, one is not best, one.falls, one.points, one.direction))
+    order = sorted(range(len(opening)), key=lambda k: group[k])
+    return [opening[k] for k in order]

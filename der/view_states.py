@@ -16,15 +16,36 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.ticker import MaxNLocator
 
 from der.checks import Array
-from der.projection import Camera, seen
+from der.projection import Camera, flat, seen
 from der.states_record import RingState, States
-from der.view_style import BAR, DPI, INK, QUIET, STABLE, TITLE, UNSTABLE, about, blank
+from der.view_arrows import arc, bends, label_places
+from der.view_style import (
+    BAR,
+    DPI,
+    INK,
+    QUIET,
+    STABLE,
+    TITLE,
+    UNSTABLE,
+    about,
+    blank,
+    legend_below,
+)
 
 MOST = 14  # states in one picture, the lowest
 COLUMN, NARROWEST, HEIGHT = 0.98, 5.2, 6.3  # inches
 HALF_WIDTH = 0.1  # of a ribbon, over the ring's mean radius: exaggerated, to be seen
-SAG = 0.3  # inches: an arrow below its chord, at most
+NODE, LETTERS = 11.5, 6.8  # points: size of a node and of the letters at an arrow
+CLEAR = 12.0  # points from the middle of a node to an arrow of others
 LARGER = 2.0  # small shapes are drawn, at most, over the scale of the largest
+GRIP: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "D",
+    "markersize": 4.6,
+    "markerfacecolor": INK,
+    "markeredgecolor": "white",
+    "markeredgewidth": 0.8,
+}
 _ZERO = 1e-9  # GJ/a: rounding
 APART = 0.22  # of the radius: how far the strands of a covered ring are drawn apart
 TILT = math.radians(42.0)  # of the view off the normal of the plane closest to a shape
@@ -55,7 +76,7 @@ def figure_of_states(found: States) -> Figure:
         panel.set_xlim(-0.5, n - 0.5)
     _pictures(row, found, shown, (right - left) * width / n, 0.3 * HEIGHT)
     _graph(graph, found, shown)
-    _legend(figure, shown)
+    _legend(figure, found, shown)
     return figure
 
 
@@ -63,7 +84,7 @@ def _title(found: States) -> str:
     """Ring, section, grips and what is left out in one line."""
     free = found.gamma is None
     parts = about(found.ring, found.section)
-    parts.append("free in space" if free else rf"in grips, $\gamma$ = {found.gamma:.4g}")
+    parts.append("free in space" if free else rf"in grips, $\gamma$ = {found.gamma:.4g} rad")
     if len(found) > MOST:
         parts.append(f"the lowest {MOST} of {len(found)} states")
     return BAR.join(parts)
@@ -90,11 +111,14 @@ def _pictures(
     if found.shapes is None:
         return
     x, frames = found.shapes.x, found.shapes.frames
-    ribbons = []
+    ribbons, cameras, held = [], [], []
     for i, state in enumerate(shown):
         spread = _drawn_apart(x[i], state)
         radius = float(np.linalg.norm(np.diff(x[i], axis=0), axis=1).sum()) / (2.0 * math.pi)
         camera = _camera(spread)
+        cameras.append(camera)
+        half = len(spread) // 2  # the grips hold the edges 0 and N/2
+        held.append(0.5 * (spread[[-1, half - 1]] + spread[[0, half]]))
         light = LIGHT @ np.stack([camera.right, camera.up, camera.towards])
         ribbons.append(
             seen(
@@ -111,8 +135,8 @@ def _pictures(
     each = (room / spans).min(axis=1)
     each = np.minimum(each, LARGER * each.min())
     for i, ((corners, colours), scale) in enumerate(zip(ribbons, each, strict=True)):
-        flat = corners.reshape(-1, 2)
-        middle = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
+        both = corners.reshape(-1, 2)
+        middle = (both.min(axis=0) + both.max(axis=0)) / 2.0
         place = np.array([i, 0.5 * (top + 0.7 / wide)])
         row.add_collection(
             PolyCollection(
@@ -122,6 +146,9 @@ def _pictures(
                 linewidths=0.2,
             )
         )
+        if found.gamma is not None:
+            spots = scale * (flat(held[i], cameras[i]) - middle) + place
+            row.plot(*spots.T, **GRIP, zorder=4)
 
 
 def _drawn_apart(x: Array, state: RingState) -> Array:
@@ -156,14 +183,14 @@ def _graph(panel: Axes, found: States, shown: tuple[RingState, ...]) -> None:
     """Nodes at their energies, arrows down."""
     energy = np.array([state.energy for state in shown])
     place = {state.name: (float(i), state.energy) for i, state in enumerate(shown)}
-    span = max(float(np.ptp(energy)), 1e-9 + 0.05 * abs(float(energy.max())), 1e-6)
-    panel.set_ylim(float(energy.min()) - 0.09 * span, float(energy.max()) + 0.08 * span)
+    low, high = float(energy.min()), float(energy.max())
+    if high - low < 0.05 * abs(high):  # one level: how far it lies above a ring without strain
+        low, high = min(low, 0.0), max(high, 0.0)
+    span = (high - low) if high - low > _ZERO else 1.0
+    panel.set_ylim(low - 0.09 * span, low + 1.08 * span)
     for i, state in enumerate(shown):
         panel.plot((i, i), (state.energy, panel.get_ylim()[1]), color="#ececec", lw=0.7, zorder=0)
-    nodes = panel.transData.transform(list(place.values()))
-    labels = [(float(x), float(y)) for x, y in nodes]
-    for k, (start, end, released) in enumerate(_merged(found, place)):
-        _arrow(panel, place[start], place[end], released, labels, k, of_cut=found[end].needs_cut)
+    _arrows(panel, found, place)
     for name, (x, y) in place.items():
         _node(panel, x, y, found[name])
     panel.set_ylabel("energy  $U\\,a/GJ$", fontsize=9, color=INK)
@@ -188,63 +215,52 @@ def _merged(
             yield *pair, fall.released
 
 
-def _arrow(
-    panel: Axes,
-    start: tuple[float, float],
-    end: tuple[float, float],
-    released: float,
-    labels: list[tuple[float, float]],
-    order: int,
-    *,
-    of_cut: bool,
-) -> None:
-    """An arrow from a state to the one it falls to; its label goes where there is most room.
+def _arrows(panel: Axes, found: States, place: Mapping[str, tuple[float, float]]) -> None:
+    """An arrow from each state to those it falls to, around other states, with what it releases.
 
     It is dashed between states of a ring that was cut, as it passes by others.
     """
-    to_pixels = panel.transData.transform
-    a, b = to_pixels(start), to_pixels(end)
-    deepest = 2.0 * SAG * DPI / max(math.hypot(*(b - a)), 1.0)
-    bend = min(0.16 if order % 2 else 0.1, deepest)
-    arrow = FancyArrowPatch(
-        start,
-        end,
-        connectionstyle=f"arc3,rad={-bend}",
-        arrowstyle="-|>",
-        mutation_scale=9,
-        shrinkA=8,
-        shrinkB=8,
-        linewidth=0.9,
-        linestyle=(0, (5.0, 2.0)) if of_cut else "-",
-        color="#6f6f6f",
-        zorder=2,
-    )
-    panel.add_patch(arrow)
-    # the curve of arc3: a parabola whose control point is rad times the chord off its middle
-    control = 0.5 * (a + b) - bend * np.array([b[1] - a[1], a[0] - b[0]])
-    best, room = None, -1.0
-    for t in (0.3, 0.24, 0.36, 0.42, 0.18, 0.5, 0.58):
-        at = (1 - t) ** 2 * a + 2 * t * (1 - t) * control + t**2 * b
-        free = min((math.hypot(*(at - np.array(o)) * (0.4, 1.0)) for o in labels), default=99.0)
-        if free > room + 1.0:
-            best, room = at, free
-        if room > 24.0:
-            break
-    if best is None:
-        return
-    labels.append((float(best[0]), float(best[1])))
-    x, y = panel.transData.inverted().transform(best)
-    panel.text(
-        float(x),
-        float(y),
-        f"{released:.3g}",
-        ha="center",
-        va="center",
-        fontsize=6.8,
-        color=INK,
-        bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none"},
-        zorder=4,
-    )
+    falls = list(_merged(found, place))
+    names = list(place)
+    nodes = panel.transData.transform(list(place.values()))
+    pairs = [(names.index(start), names.index(end)) for start, end, _ in falls]
+    extent = panel.get_window_extent()
+    box = (np.array([extent.x0, extent.y0]), np.array([extent.x1, extent.y1]))
+    radius = 0.5 * NODE * DPI / 72.0
+    chosen = bends(nodes, pairs, CLEAR * DPI / 72.0, box)
+    t = np.linspace(0.0, 1.0, 61)
+    ways = [arc(nodes[a], nodes[b], rad, t) for (a, b), rad in zip(pairs, chosen, strict=True)]
+    texts = [f"{released:#.3g}" for _, _, released in falls]
+    half = [np.array([0.31 * len(text) + 0.2, 0.75]) * LETTERS * DPI / 72.0 for text in texts]
+    places = label_places(nodes, ways, half, radius)
+    for (start, end, _), rad in zip(falls, chosen, strict=True):
+        arrow = FancyArrowPatch(
+            place[start],
+            place[end],
+            connectionstyle=f"arc3,rad={rad}",
+            arrowstyle="-|>",
+            mutation_scale=9,
+            shrinkA=8,
+            shrinkB=8,
+            linewidth=0.9,
+            linestyle=(0, (5.0, 2.0)) if found[end].needs_cut else "-",
+            color="#6f6f6f",
+            zorder=2,
+        )
+        panel.add_patch(arrow)
+    for text, at in zip(texts, places, strict=True):
+        x, y = panel.transData.inverted().transform(at)
+        panel.text(
+            float(x),
+            float(y),
+            text,
+            ha="center",
+            va="center",
+            fontsize=LETTERS,
+            color=INK,
+            bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none"},
+            zorder=4,
+        )
 
 
 def _node(panel: Axes, x: float, y: float, state: RingState) -> None:
@@ -254,7 +270,7 @@ def _node(panel: Axes, x: float, y: float, state: RingState) -> None:
         x,
         y,
         marker="s" if state.needs_cut else "o",
-        markersize=11.5,
+        markersize=NODE,
         markerfacecolor=colour if state.stable else "white",
         markeredgecolor=colour,
         markeredgewidth=1.5,
@@ -279,30 +295,25 @@ def _colour(state: RingState) -> str:
     return STABLE if state.stable else UNSTABLE
 
 
-def _legend(figure: Figure, shown: tuple[RingState, ...]) -> None:
-    kinds: list[tuple[str, dict[str, Any]]] = [
-        ("minimum", {"marker": "o", "markerfacecolor": STABLE, "markeredgecolor": STABLE}),
-        (
-            "saddle, with its ways down",
-            {"marker": "o", "markerfacecolor": "white", "markeredgecolor": UNSTABLE},
-        ),
-    ]
+def _legend(figure: Figure, found: States, shown: tuple[RingState, ...]) -> None:
+    """What nodes, lines and marks mean, of those that are there."""
+    white = {"marker": "o", "markerfacecolor": "white", "markeredgecolor": UNSTABLE}
+    kinds: list[tuple[str, dict[str, Any]]] = []
+    if any(state.stable for state in shown):
+        look = {"marker": "o", "markerfacecolor": STABLE, "markeredgecolor": STABLE}
+        kinds.append(("minimum", look))
+    if not all(state.stable for state in shown):
+        kinds.append(("saddle, with its ways down", white))
     if any(state.needs_cut for state in shown):
         look = {"marker": "s", "markerfacecolor": "white", "markeredgecolor": INK}
         kinds.append(("square, dashed: of a ring cut, turned once and joined", look))
     handles = [
         Line2D([], [], linestyle="none", markersize=7, label=label, **look) for label, look in kinds
     ]
-    arrow: dict[str, Any] = {"color": "#6f6f6f", "linewidth": 0.9, "marker": ">", "markersize": 4}
-    handles.append(Line2D([], [], label="falls to, energy released", **arrow))
-    figure.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 0.004),
-        ncols=len(handles),
-        frameon=False,
-        fontsize=7.8,
-        columnspacing=1.6,
-        handletextpad=0.5,
-        labelcolor=INK,
-    )
+    if found.gamma is not None and found.shapes is not None:
+        handles.append(Line2D([], [], label="grip", **GRIP))
+    if any(fall.end is not None for fall in found.transitions):
+        arrow: dict[str, Any] = {"color": "#6f6f6f", "linewidth": 0.9, "marker": ">"}
+        label = "falls to, energy released  [GJ/a]"
+        handles.append(Line2D([], [], label=label, markersize=4, **arrow))
+    legend_below(figure, handles, fontsize=7.8)

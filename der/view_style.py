@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path as File
 from typing import Any
 
@@ -99,9 +99,41 @@ def about(ring: Mapping[str, object], section: Mapping[str, object]) -> list[str
     return parts
 
 
+def sure(value: float, error: float) -> str:
+    """An extrapolated value with its error, both to the second digit of the error."""
+    if not error > 0.0:
+        return f"{value:.6g}"
+    places = min(max(1 - math.floor(math.log10(error)), 0), 12)
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
 def dress(panel: Axes, label: str) -> None:
     """Axes as all pictures have them, with the name of what goes up."""
     panel.set_ylabel(label, fontsize=9, color=INK)
     panel.tick_params(labelsize=8, color=QUIET, labelcolor=INK, direction="in")
     panel.spines[["top", "right"]].set_visible(False)
     panel.spines[["left", "bottom"]].set_color(QUIET)
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], *, fontsize: float = 8.0) -> None:
+    """A legend along the lower edge, in as many columns as there is width for."""
+    if not handles:
+        return
+    for columns in range(len(handles), 0, -1):
+        legend = figure.legend(
+            handles=list(handles),
+            loc="lower center",
+            bbox_to_anchor=(0.5, 0.004),
+            ncols=columns,
+            frameon=False,
+            fontsize=fontsize,
+            handlelength=2.0,
+            columnspacing=1.6,
+            handletextpad=0.5,
+            labelspacing=0.35,
+            borderaxespad=0.1,
+            labelcolor=INK,
+        )
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()

@@ -12,7 +12,10 @@ writes path.json, shapes.npz, path.png and path.rrd to DIR (default: out/fold_by
 from __future__ import annotations
 
 import der
-from scenarios.output import write
+from scenarios.output import usage, write
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 scene = der.Scene(
     der.circle(),

@@ -12,7 +12,10 @@ out/fold_by_dynamic_relaxation).
 from __future__ import annotations
 
 import der
-from scenarios.output import write
+from scenarios.output import usage, write
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 scene = der.Scene(
     der.circle(),

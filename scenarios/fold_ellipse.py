@@ -12,7 +12,10 @@ writes path.* and about_y.* (json, npz, png, rrd) to DIR (default: out/fold_elli
 from __future__ import annotations
 
 import der
-from scenarios.output import write
+from scenarios.output import usage, write
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 SECTION = der.rectangular_section(h_over_t=4.0)
 

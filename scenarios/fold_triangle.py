@@ -14,7 +14,10 @@ from __future__ import annotations
 import math
 
 import der
-from scenarios.output import write
+from scenarios.output import usage, write
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 scene = der.Scene(
     der.triangle(math.pi / 2, 1 / 30),

@@ -13,7 +13,6 @@ to none, which is to be trusted to about a tenth of its distance from the finer 
 
 from __future__ import annotations
 
-import argparse
 import csv
 import math
 from collections.abc import Callable, Iterator
@@ -32,6 +31,7 @@ from der.sector import Sector, free_ring, sector
 from der.special import Wanted, three_covered
 from der.stability import all_modes, index, softest_modes
 from der.step import Tally
+from validation.arguments import Arguments
 
 EDGES = 128
 FLATTEST, SLENDEREST = 0.8, 100.0  # h/t between which thresholds are sought
@@ -219,7 +219,7 @@ def rings(*, quick: bool = False) -> Iterator[tuple[str, float, Ring]]:
 
 def main() -> None:
     """Print and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = Arguments(__file__, __doc__)
     parser.add_argument("--out", type=File, default=File("out/folded_stability"))
     parser.add_argument("--quick", action="store_true", help="the circle alone")
     asked = parser.parse_args()

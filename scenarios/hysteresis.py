@@ -25,8 +25,11 @@ import numpy as np
 
 import der
 from der.files import write_whole
-from scenarios.output import folder, write
+from scenarios.output import folder, usage, write
 from scenarios.snapping_rings import SNAPPING
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 EDGES = 128
 LOADS = tuple(np.linspace(0.0, math.pi, 257))  # states at these, so that integrals are accurate

@@ -18,7 +18,10 @@ import numpy as np
 import der
 from der.landscape_curve import landscape
 from der.landscape_over import barriers_over
-from scenarios.output import folder
+from scenarios.output import folder, usage
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 H_OVER_T = np.geomspace(1.0, 30.0, 40)
 BESIDE = (3.55, 3.6, 3.7, 3.8)  # sections beside the threshold, from which it is extrapolated

@@ -19,7 +19,10 @@ import der
 from der.landscape_curve import landscape
 from der.landscape_free import free_barrier
 from der.landscape_over import barriers_over
-from scenarios.output import folder
+from scenarios.output import folder, usage
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 H_OVER_T = np.geomspace(1.8, 30.0, 24)
 ring = der.ellipse(b_over_a=0.6)

@@ -16,7 +16,10 @@ import numpy as np
 
 import der
 from der.landscape_surface import surface
-from scenarios.output import folder
+from scenarios.output import folder, usage
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 sheet = surface(der.Scene(der.circle(), der.rectangular_section(1.6)), shape=(48, 48))
 

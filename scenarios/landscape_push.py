@@ -22,7 +22,10 @@ from der.landscape_free import ALIKE, twisted_rests
 from der.landscape_march import march
 from der.landscape_push import least_push
 from der.landscape_tools import struts
-from scenarios.output import folder
+from scenarios.output import folder, usage
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 N_EDGES = 48
 SECTION = der.rectangular_section(4.0)

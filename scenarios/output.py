@@ -7,6 +7,20 @@ from pathlib import Path as File
 
 from der.record import Path
 from der.summary import summary
+from validation.arguments import Arguments
+
+
+def usage(file: str, text: str | None) -> None:
+    """Answer `--help` and refuse what is not known, before anything is solved.
+
+    Parameters
+    ----------
+    file, text : the scenario's `__file__` and docstring.
+    """
+    parser = Arguments(file, text)
+    where = f"where the results go (out/{File(file).stem})"
+    parser.add_argument("folder", metavar="DIR", nargs="?", help=where)
+    parser.parse_args()
 
 
 def folder(name: str) -> File:

@@ -13,7 +13,6 @@ prints a table and writes stops.csv to DIR (default: out/random_folds).
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 import math
@@ -28,6 +27,7 @@ import der
 from der.record import Path
 from der.ring import Ring
 from der.sections import Section
+from validation.arguments import Arguments
 from validation.random_rings import LOOSE, random_rings, work_missing
 
 WAYS: dict[str, dict[str, object]] = {
@@ -117,7 +117,7 @@ def faults(scene: der.Scene, path: Path) -> list[str]:
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = Arguments(__file__, __doc__)
     parser.add_argument("--count", type=int, default=500)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--edges", type=int, default=64)

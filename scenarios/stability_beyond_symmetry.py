@@ -17,7 +17,6 @@ writes survey.csv and survey.png to DIR (default: out/stability_beyond_symmetry)
 
 from __future__ import annotations
 
-import argparse
 import csv
 import math
 from collections.abc import Iterator
@@ -30,6 +29,7 @@ import der
 from der.record import NO_MOMENT, Path
 from der.ring import Ring
 from scenarios.folded_stability import LARGEST_CIRCLE
+from validation.arguments import Arguments
 
 EDGES = 64
 INSCRIBED_60 = math.sqrt(3) / 6  # r/a at which a triangle of 60 degrees is a circle
@@ -261,7 +261,7 @@ def draw(verdicts: list[Verdict], file: File) -> None:
 
 def main() -> None:
     """Run, write, and print what is wrong."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = Arguments(__file__, __doc__)
     parser.add_argument("--out", type=File, default=File("out/stability_beyond_symmetry"))
     parser.add_argument("--edges", type=int, default=EDGES)
     parser.add_argument("--quick", action="store_true", help="an ellipse at four sections")

@@ -27,7 +27,10 @@ import der
 from der.sector import sector
 from der.stability import all_modes, raw_index
 from der.states_starts import covered
-from scenarios.output import folder
+from scenarios.output import folder, usage
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 H_OVER_T = 2.0
 SPAN = (0.0, 4.0)  # of the natural curvature

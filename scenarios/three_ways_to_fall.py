@@ -38,8 +38,11 @@ from der.sector import Sector, sector
 from der.snap import KICK, Landing
 from der.special import Wanted, visit
 from der.step import Tally
-from scenarios.output import folder
+from scenarios.output import folder, usage
 from scenarios.snapping_rings import SNAPPING
+
+if __name__ == "__main__":
+    usage(__file__, __doc__)
 
 EDGES = 64
 RINGS = {"circle": (der.circle(), 1.6), **SNAPPING}

@@ -6,9 +6,11 @@ import json
 import math
 import os
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import der
 from der.landscape_curve import landscape
@@ -172,6 +174,21 @@ def test_json_of_a_pass():
     assert entries["barriers"]["open"] < entries["twisting"]["open"]
     assert entries["saddle"]["index"] == 1
     assert len(entries["way"]["energy"]) == len(entries["way"]["progress"]) > 20
+
+
+def test_pictures_show_extrapolated_barriers():
+    """Where there are error bars; the mesh's value beside them, else it alone. GJ/a throughout."""
+    plain, sure = along(8.0), {"open": (0.0210883, 5.2e-4), "fold": (9.7169, 5.2e-4)}
+    said = "|".join(t.get_text() for t in figure_of_landscape(plain).findobj(Text))
+    assert f"to open\n{plain.barriers.open:.4g} GJ/a" in said
+    assert "extrapolated" not in said
+    figure = figure_of_landscape(replace(plain, extrapolated=sure))
+    said = "|".join(t.get_text() for t in figure.findobj(Text))
+    assert f"0.02109\n± 0.00052 GJ/a\nextrapolated\n(mesh {plain.barriers.open:.5g})" in said
+    figure = figure_of_pass(replace(alone(), extrapolated=sure))
+    said = figure.axes[0].texts[0].get_text()
+    assert "to open: 0.02109 ± 0.00052 GJ/a, extrapolated" in said
+    assert "in clamped grips, by twisting: " in said
 
 
 def test_pictures(tmp_path):

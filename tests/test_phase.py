@@ -383,3 +383,15 @@ def test_sample_is_the_same_every_time(diagram):
     assert [pair.bvp for pair in again] == [pair.bvp for pair in diagram.compared]
     assert {pair.rod.message for pair in again} == {"ValueError: no rod"}
     assert "0 of 4 labels agree" in table(again)
+
+
+def test_the_bench_shows_its_usage_instead_of_running(monkeypatch, capsys):
+    """Exit 0 with words; exit 2 with a line for what is not known."""
+    for word, code in (("--help", 0), ("--fast", 2)):
+        monkeypatch.setattr("sys.argv", ["bench_phase", word])
+        with pytest.raises(SystemExit) as left:
+            bench_phase.main()
+        assert left.value.code == code
+    said = capsys.readouterr()
+    assert said.out.startswith("usage: python -m validation.bench_phase")
+    assert said.err == "python -m validation.bench_phase: unrecognized arguments: --fast\n"

@@ -29,7 +29,7 @@ from der.rod import State, edges, strains
 from der.special import Wanted
 from der.step import Tally
 from der.supports import supports
-from der.view_push import figure_of_push
+from der.view_push import EVENTS, figure_of_push
 
 ALIKE = 1e-5  # GJ/a
 
@@ -427,6 +427,21 @@ def test_words_and_picture():
     figure = figure_of_push(found)
     rings, *_ = figure.axes
     assert len([t for t in rings.texts if "work" in t.get_text()]) == 4
+
+
+def test_picture_shows_what_is_extrapolated_and_how_many_there_are():
+    """Values without mesh in the caption; counts and marks of all events in the legend."""
+    found = replace(searched(), extrapolated={"force": (0.021088, 5.2e-4)})
+    figure = figure_of_push(found)
+    captions = [t.get_text() for t in figure.axes[0].texts if "work" in t.get_text()]
+    assert "work 0.02109 ± 0.00052 GJ/a\nextrapolated" in captions[0]
+    legend = [t.get_text() for t in figure.legends[0].get_texts()]
+    opening = sum(one.kind == "force" and one.opens for one in found.pushes)
+    (said,) = [t for t in legend if t.startswith("slow force")]
+    assert f"{opening} that open it" in said
+    shown = {found.pushes[k].held.event for k in found.least.values()}
+    shown |= {found.pushes[k].dead.event for k in found.least_dead.values()}
+    assert len([t for t in legend if t in EVENTS.values()]) == len(shown)
 
 
 def test_the_limit_of_a_dead_load_is_the_largest_force():

@@ -1,6 +1,41 @@
 """Scenarios run on import; one physical number of each is pinned."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
+import pytest
+
+HOUSE = Path(__file__).parent.parent
+RUN = [f for f in sorted((HOUSE / "scenarios").glob("*.py")) if "__main__" in f.read_text()]
+
+
+@pytest.mark.parametrize("file", RUN, ids=lambda file: file.stem)
+def test_every_scenario_reads_its_arguments_before_it_solves(file):
+    """By the shared parser, before anything of der is called."""
+    text = file.read_text()
+    asked = 'if __name__ == "__main__":\n    usage(__file__, __doc__)\n'
+    assert "Arguments(__file__, __doc__)" in text or text.count(asked) == 1
+    head = text.split(asked)[0]
+    assert "der.Scene(" not in head or "Arguments(" in text
+
+
+def test_a_usage_and_one_line_for_what_is_not_known(tmp_path):
+    """Exit 0 with the docstring; exit 2 with a line; nothing solved or written by either."""
+    command = [sys.executable, "-m", "scenarios.fold_rectangle"]
+    where = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(HOUSE)}}
+    text = {"capture_output": True, "text": True, "check": False}
+    done = subprocess.run([*command, "--help"], **text, **where)
+    assert done.returncode == 0
+    assert done.stdout.startswith("usage: python -m scenarios.fold_rectangle [-h] [DIR]")
+    done = subprocess.run([*command, "--frobnicate"], **text, **where)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.splitlines() == [
+        "python -m scenarios.fold_rectangle: unrecognized arguments: --frobnicate"
+    ]
+    assert not list(tmp_path.iterdir())
 
 
 def test_fold_by_path_following():

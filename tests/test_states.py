@@ -3,6 +3,7 @@
 import json
 import math
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from der.states_images import Images, curvatures, images, repeats
 from der.states_measures import needs_cut, turning
 from der.states_record import RingState, States, Transition
 from der.states_starts import covered, eight
+from der.view_arrows import arc, bends, label_places
 from der.view_states import figure_of_states
 from der.view_style import save_figure
 
@@ -305,12 +307,56 @@ def test_every_state_and_fall_is_drawn():
     """A name above each column, a node with the index, an arrow for each pair, with its energy."""
     row, graph = figure_of_states(sample()).axes
     assert [t.get_text() for t in row.texts][::2] == ["flat", "figure eight", "saddle 1"]
-    assert [t.get_text() for t in graph.texts] == ["9", "0", "1", "?"]
+    assert [t.get_text() for t in graph.texts] == ["9.00", "0", "1", "?"]
     assert len(graph.patches) == 1
     with pytest.raises(ValueError, match="at least one"):
         figure_of_states(sample(states=(), transitions=()))
     with pytest.raises(ValueError, match="plot must end in"):
         save_figure(figure_of_states(sample()), "states.txt")
+
+
+def test_the_legend_fits_whatever_there_is():
+    """On a narrow page in several rows, nothing beyond the edges."""
+    figure = figure_of_states(sample())
+    (legend,) = figure.legends
+    box = legend.get_window_extent()
+    assert box.x0 >= 0.0
+    assert box.x1 <= figure.bbox.width
+
+
+def test_the_axis_of_one_state_begins_at_a_ring_without_strain():
+    """Else a single level would stand on an axis of no meaning."""
+    single = replace(sample().states[1], energy=8.0)
+    graph = figure_of_states(sample(states=(single,), transitions=(), gamma=1.0)).axes[1]
+    assert graph.get_ylim()[0] < 0.0 < 8.0 < graph.get_ylim()[1]
+    title = figure_of_states(sample(gamma=1.0)).texts[0].get_text()
+    assert title.endswith("= 1 rad")
+
+
+def test_arrows_go_around_other_points():
+    """The straight way from the third to the first would pass through the second."""
+    points = np.array([[0.0, 0.0], [100.0, 100.0], [200.0, 200.0]])
+    box = (np.array([-50.0, -50.0]), np.array([250.0, 250.0]))
+    (rad,) = bends(points, [(2, 0)], 20.0, box)
+    way = arc(points[2], points[0], rad, np.linspace(0.0, 1.0, 200))
+    assert np.linalg.norm(way - points[1], axis=1).min() > 19.0
+    np.testing.assert_allclose(way[[0, -1]], points[[2, 0]])
+
+
+def test_arrows_between_the_same_points_do_not_coincide():
+    """There and back: two ways, and two labels that do not lie on each other."""
+    points = np.array([[0.0, 0.0], [300.0, 30.0]])
+    box = (np.array([-50.0, -150.0]), np.array([350.0, 150.0]))
+    pairs = [(0, 1), (1, 0)]
+    t = np.linspace(0.0, 1.0, 61)
+    ways = [
+        arc(points[a], points[b], rad, t)
+        for (a, b), rad in zip(pairs, bends(points, pairs, 20.0, box), strict=True)
+    ]
+    assert np.linalg.norm(ways[0] - ways[1][::-1], axis=1).max() > 20.0
+    half = [np.array([20.0, 8.0])] * 2
+    one, other = label_places(points, ways, half, 10.0)
+    assert np.any(np.abs(one - other) > (40.0, 16.0))
 
 
 def command(capsys, *words):

@@ -168,6 +168,46 @@ def test_captions_say_that_the_ring_falls(loop):
     assert all("M =" not in said[k].numbers for k in falling)
 
 
+def test_captions_say_which_way_the_grips_turn(path, loop):
+    """Up to pi and back: loading, then unloading; nothing where there is no way back."""
+    said = captions(loop, evenly(loop, 100))
+    ways = [one.way for one in said]
+    first = ways.index("unloading")
+    assert set(ways[:first]) == {"loading"}
+    assert set(ways[first:]) == {"unloading"}
+    assert evenly(loop, 100).gamma.argmax() == first
+    assert said[0].line == "loading, stable"
+    assert {one.way for one in captions(path, evenly(path, 30))} == {""}
+
+
+def test_an_event_is_said_for_a_while(path):
+    """At its step and a little longer; not up to the next one."""
+    film = evenly(path, 100)
+    said = captions(path, film)
+    last = film.step_of(path.points[-1].position)
+    assert said[last].event
+    before = film.step_of(path.points[0].position)
+    assert not any(one.event for one in said[:before])
+    shown = sum(bool(one.event) for one in said)
+    assert 0 < shown <= 0.13 * len(said) * len(path.points)
+
+
+def test_names_name_all_that_differs(path):
+    """Shape, axis, solver, also where h/t alone would tell two paths apart."""
+    ellipse = {"shape": "ellipse", "twist_axis": "x"}
+    slim = {**path.section, "h_over_t": 4.0}
+    one = replace(path, ring={**ellipse, "b_over_a": 0.6})
+    other = replace(path, ring={**ellipse, "b_over_a": 0.8, "twist_axis": "y"}, section=slim)
+    assert names([one, other]) == [
+        "ellipse, h/t = 1.6, b/a 0.6, about x",
+        "ellipse, h/t = 4, b/a 0.8, about y",
+    ]
+    assert names([path, one]) == ["circle, h/t = 1.6", "ellipse, h/t = 1.6, b/a 0.6"]
+    assert names([path, replace(path, solver="bvp", numerics={"intervals": 14})])[1].startswith(
+        "circle, h/t = 1.6, boundary-value problem"
+    )
+
+
 def test_names_tell_paths_apart(path, loop):
     slim = folded(der.rectangular_section(h_over_t=4))
     assert names([path]) == ["circle, h/t = 1.6"]

@@ -17,6 +17,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path as File
 
+from validation.arguments import Arguments
 from validation.cases import Case, Row, solve_case
 from validation.families import family
 from validation.scan import Solve, solve_all
@@ -116,6 +117,7 @@ def _wall(cases: Sequence[Case], crew: Workers, solve: Solve) -> tuple[float, fl
 
 def main() -> None:
     """Print the rows."""
+    Arguments(__file__, __doc__).parse_args()
     for group, case, value, unit, goal, note in rows(5):
         print(f"{group:7}{case:40}{value:8.3g} {unit:6} goal {goal:<5g} {note}", flush=True)
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path as File
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from der.curve import smooth
 from der.files import FilePath, write_whole
 from der.record import Path
 from der.summary import headline
@@ -26,12 +28,26 @@ def figure_of_comparison(comparison: Comparison) -> Figure:
     FigureCanvasAgg(figure)
     rod = comparison.rod
     figure.suptitle(headline(rod), fontsize=10)
-    grid = figure.add_gridspec(2, 2, left=0.085, right=0.98, bottom=0.085, top=0.93, wspace=0.22)
-    for column, (name, label) in enumerate((("moment", "M a/GJ"), ("energy", "U a/GJ"))):
+    grid = figure.add_gridspec(
+        2, 2, left=0.1, right=0.985, bottom=0.125, top=0.935, wspace=0.27, hspace=0.23
+    )
+    handles: dict[str, Any] = {}
+    for column, (name, label) in enumerate((("moment", "$M\\,a/GJ$"), ("energy", "$U\\,a/GJ$"))):
         above = figure.add_subplot(grid[0, column])
         below = figure.add_subplot(grid[1, column])
         _curves(above, comparison, name, label)
         _distances(below, comparison, name)
+        for axes in (above, below):
+            handles |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    figure.legend(
+        list(handles.values()),
+        list(handles),
+        loc="lower center",
+        ncols=3,
+        frameon=False,
+        fontsize=8,
+        borderaxespad=0.2,
+    )
     return figure
 
 
@@ -53,21 +69,29 @@ def save_comparison(comparison: Comparison, file: FilePath) -> None:
 
 
 def _curves(axes: Axes, comparison: Comparison, name: str, label: str) -> None:
-    """Both paths; the rod's states as open circles on the other's line."""
+    """Both paths: the rod's states as open circles on the other's curve, smooth through its own."""
     rod, bvp = comparison.rod, comparison.bvp
     axes.plot(
-        bvp.gamma / math.pi,
-        getattr(bvp, name),
+        *smooth(bvp, getattr(bvp, name)).T,
         color=BVP,
         linewidth=1.4,
         label=f"boundary-value problem, {bvp.numerics['intervals']} intervals",
+    )
+    axes.plot(
+        bvp.gamma / math.pi,
+        getattr(bvp, name),
+        linestyle="none",
+        marker="o",
+        markersize=2.6,
+        color=BVP,
+        label="its states",
     )
     axes.plot(
         rod.gamma / math.pi,
         getattr(rod, name),
         linestyle="none",
         marker="o",
-        markersize=3.6,
+        markersize=4.6,
         markerfacecolor="none",
         color=ROD,
         label=f"rod, {rod.numerics['n_edges']} edges{_extrapolated(rod)}",
@@ -75,7 +99,6 @@ def _curves(axes: Axes, comparison: Comparison, name: str, label: str) -> None:
     axes.set_xlabel("$\\gamma/\\pi$")
     axes.set_ylabel(label)
     axes.margins(x=0.02)
-    axes.legend(frameon=False, fontsize=7.5, loc="best")
 
 
 def _extrapolated(rod: Path) -> str:
@@ -109,7 +132,7 @@ def _distances(axes: Axes, comparison: Comparison, name: str) -> None:
             label="error bar",
         )
     axes.set_xlabel("$\\gamma/\\pi$")
-    axes.set_ylabel("distance in the scaled plane")
+    if name == "moment":
+        axes.set_ylabel("distance in the scaled plane")
     axes.set_ylim(bottom=0.5 * FLOOR)
     axes.margins(x=0.02)
-    axes.legend(frameon=False, fontsize=7.5, loc="best")

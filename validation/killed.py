@@ -10,7 +10,6 @@ that a worker begins a note is taken, so that what was in flight at a kill is kn
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import signal
@@ -23,6 +22,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
 
+from validation.arguments import Arguments
 from validation.cases import Case, Row, solve_case
 from validation.phase import STORE, run_phase
 from validation.store import Store
@@ -266,8 +266,7 @@ def _same(one: File, other: File) -> bool:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command; 0 if all is as it should be."""
-    words = argparse.ArgumentParser(prog="python -m validation.killed", description=__doc__)
-    words.formatter_class = argparse.RawDescriptionHelpFormatter
+    words = Arguments(__file__, __doc__)
     words.add_argument("--times", type=int, default=20, help="kills (20)")
     words.add_argument("--diagram", default="fig3a", help="see der phase (fig3a)")
     words.add_argument("--finest", type=int, default=16, help="cells along a side (16)")
