@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from der.folding import fold
+    from der.landscape_push import least_push
     from der.record import Path, Point
     from der.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.scene import Scene
     from der.sections import Scale, Section, rectangular_section, section
+    from der.shapes import Shapes
     from der.states_record import RingState, States, Transition
     from der.states_search import states
     from der.unfinished import Interrupted, NotConverged
@@ -29,11 +31,13 @@ __all__ = [
     "Scale",
     "Scene",
     "Section",
+    "Shapes",
     "States",
     "Transition",
     "circle",
     "ellipse",
     "fold",
+    "least_push",
     "profile",
     "rectangle",
     "rectangular_section",
@@ -44,10 +48,12 @@ __all__ = [
 
 _HOME = {
     "folding": ("fold",),
+    "landscape_push": ("least_push",),
     "record": ("Path", "Point"),
     "ring": ("Ring", "circle", "ellipse", "profile", "rectangle", "triangle"),
     "scene": ("Scene",),
     "sections": ("Scale", "Section", "rectangular_section", "section"),
+    "shapes": ("Shapes",),
     "states_record": ("RingState", "States", "Transition"),
     "states_search": ("states",),
     "unfinished": ("Interrupted", "NotConverged"),

@@ -19,24 +19,26 @@ import typer
 
 from der.output import (
     OUTPUT,
-    UNSAVED,
+    check_named,
     check_writable,
+    deliver,
+    keep_somewhere,
     kept,
+    places,
     say,
     show,
     targets,
     whereabouts,
-    write,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from der.output import Record, Targets, Writers
     from der.record import Path
     from der.ring import Ring
     from der.scene import Scene
     from der.sections import Section
-    from der.states_record import States
     from der.view_rerun import Live
 
 SHAPES = {  # and the options that go with each
@@ -119,8 +121,8 @@ def _options_named() -> Iterator[None]:
     except ValueError as wrong:
         words = str(wrong).split(" ", 1)
         option = {"n_edges": "edges", "twist_axis": "axis"}.get(words[0], words[0])
-        option = option.replace("_", "-")
-        raise typer.TyperException(" ".join([f"--{option}", *words[1:]])) from None
+        option = "FILE" if option == "file" else f"--{option.replace('_', '-')}"
+        raise typer.TyperException(" ".join([option, *words[1:]])) from None
 
 
 # --- What commands have in common ------------------------------------------------------------
@@ -308,7 +310,7 @@ class FileOptions:
         """Whether shapes are needed."""
         return self.moving or any(file is not None for file in (self.plot, self.out))
 
-    def targets(self) -> dict[str, File]:
+    def targets(self) -> Targets:
         """The files to write, after making sure that they can be written."""
         return targets(self.json, self.plot, self.rrd, self.out, movie=self.movie, html=self.html)
 
@@ -342,7 +344,12 @@ def _command(*groups: Any) -> Callable[[Callable[..., int]], Callable[..., None]
     def wrap(function: Callable[..., int]) -> Callable[..., None]:
         def run(**given: Any) -> None:
             made = [group(**{f.name: given[f.name] for f in fields(group)}) for group in groups]
-            raise typer.Exit(function(*made))
+            try:
+                code = function(*made)
+            except KeyboardInterrupt:  # typer would say nothing
+                say("der: stopped by the user before anything was found")
+                code = 130
+            raise typer.Exit(code)
 
         hints = {name: h for g in groups for name, h in get_type_hints(g, None, None, True).items()}
         parameters = [
@@ -472,8 +479,7 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
 
         check(path.scene(ring, error_bars=False), TOLERANCE)  # what the other solver cannot do
         scene = path.scene(ring, error_bars=True)
-        written = targets(files.json, files.plot, None, files.out, stem="comparison")
-        written.pop("shapes", None)
+        written = targets(files.json, files.plot, None, files.out, stem="comparison", shapes=False)
     from der.folding import fold as solve
     from der.unfinished import Interrupted, NotConverged
     from validation.comparison import compare as compared
@@ -485,22 +491,13 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
     except (NotConverged, Interrupted) as unfinished:
         code = 3 if isinstance(unfinished, NotConverged) else 130
         return _finish(unfinished.path, {}, code, quiet=files.quiet)
-    code = 0
-    for name, file in written.items():
-        try:
-            if name == "plot":
-                from validation.comparison_plot import save_comparison
 
-                save_comparison(found, file)
-            elif file != OUTPUT:
-                found.save(file)
-        except OSError as wrong:
-            say(f"der: could not write {file}: {wrong}")
-            code = 3
-    text = found.to_json().rstrip() if written.get("json") == OUTPUT else table(found)
-    if (not files.quiet or written.get("json") == OUTPUT) and not show(text):
-        code = 3
-    return code
+    def plot(file: File) -> None:
+        from validation.comparison_plot import save_comparison
+
+        save_comparison(found, file)
+
+    return _hand_over(found, written, 0, {"plot": plot}, lambda: table(found), quiet=files.quiet)
 
 
 HYSTERESIS = "hysteresis"  # a figure that the rod draws: loading and unloading of four rings
@@ -519,6 +516,7 @@ def figure(
 ) -> None:
     """Draw the paper's figures: PNG, and the data as CSV. Diagrams are the phase diagrams."""
     with _options_named():
+        check_named(out=out)
         from validation.figures import DIAGRAMS, FIGURES, Interrupted, draw
 
         several = {"all": [*FIGURES, HYSTERESIS], "diagrams": list(DIAGRAMS)}
@@ -543,6 +541,9 @@ def figure(
     raise typer.Exit(code)
 
 
+CELLS = 60  # along each side of a surface
+
+
 @dataclass(frozen=True)
 class LandscapeOptions:
     """Which landscape, and what is written."""
@@ -558,7 +559,7 @@ class LandscapeOptions:
     ] = False
     cells: Annotated[
         int, typer.Option(parser=_whole, help="Along each side, with --two-dimensional.")
-    ] = 60
+    ] = CELLS
     json: Annotated[str | None, typer.Option(metavar="F", help="Write it here ('-': output).")] = (
         None
     )
@@ -577,20 +578,15 @@ class LandscapeOptions:
 def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) -> int:
     """Map the energy: rests, wells, saddles, and barriers to fold the ring and to open it."""
     with _options_named():
-        if wanted.two_dimensional and wanted.free:
-            raise ValueError("free cannot be given together with --two-dimensional, got both")
-        if wanted.push and (wanted.two_dimensional or wanted.free):
-            other = "--free" if wanted.free else "--two-dimensional"
-            raise ValueError(f"push cannot be given together with {other}, got both")
-        if not 3 <= wanted.cells <= 1000:
-            raise ValueError(f"cells must be from 3 to 1000, got {wanted.cells}")
-        if wanted.free and wanted.rrd is not None:
-            raise ValueError(f"rrd cannot be given together with --free, got {wanted.rrd!r}")
+        _check_landscape(path, wanted)
         scene = path.scene(ring, error_bars=not wanted.two_dimensional)
         if wanted.rrd is not None and not wanted.two_dimensional:
             scene = _with_shapes(scene)
-        written = targets(wanted.json, wanted.plot, wanted.rrd, wanted.out, stem="landscape")
-        written.pop("shapes", None)
+        written = targets(
+            wanted.json, wanted.plot, wanted.rrd, wanted.out, stem="landscape", shapes=False
+        )
+        from der.landscape_curve import landscape as curve
+
         found: Any
         with _progress(scene, quiet=wanted.quiet) as tick:
             if wanted.two_dimensional:
@@ -606,75 +602,57 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
 
                 found = free_barrier(scene)
             else:
-                from der.landscape_curve import landscape as along
+                found = curve(scene, progress=tick)
+    from der.drawings import of_landscape
+    from der.landscape_words import reason, words
 
-                found = along(scene, progress=tick)
-        recorded = found
-        if wanted.rrd is not None and wanted.two_dimensional and found.status != "interrupted":
-            from der.landscape_curve import landscape as along
+    def along() -> Any:
+        return curve(_with_shapes(scene), index_free=False) if wanted.two_dimensional else found
 
-            recorded = along(_with_shapes(scene), index_free=False)
     code = {"done": 0, "interrupted": 130}.get(found.status, 3)
-    if "rrd" in written and not _record_landscape(recorded, found, written.pop("rrd")):
-        code = code or 3
-    return _write_landscape(found, written, code, quiet=wanted.quiet)
+    return _hand_over(
+        found,
+        written,
+        code,
+        of_landscape(found, along),
+        lambda: words(found, why=not code),
+        unfinished=f"{reason(found)}; what was found is",
+        quiet=wanted.quiet,
+    )
+
+
+def _check_landscape(path: PathOptions, wanted: LandscapeOptions) -> None:
+    """Refuse options that a landscape of this kind would not look at."""
+    modes = {
+        "--two-dimensional": wanted.two_dimensional,
+        "--free": wanted.free,
+        "--push": wanted.push,
+    }
+    kinds = [name for name, is_given in modes.items() if is_given]
+    if len(kinds) > 1:
+        raise ValueError(f"{kinds[-1][2:]} cannot be given together with {kinds[0]}, got both")
+    if not 3 <= wanted.cells <= 1000:
+        raise ValueError(f"cells must be from 3 to 1000, got {wanted.cells}")
+    if wanted.cells != CELLS and not wanted.two_dimensional:
+        raise ValueError(f"cells must go with --two-dimensional, got {wanted.cells} alone")
+    if wanted.rrd is not None and (wanted.free or wanted.push):
+        raise ValueError(f"rrd cannot be given together with {kinds[0]}, got {wanted.rrd!r}")
+    if path.control != "arclength":
+        raise ValueError(f"control must be 'arclength' for a landscape, got {path.control!r}")
+    if path.gamma_max != math.pi:
+        raise ValueError(
+            "gamma_max cannot be given for a landscape, which ends where the ring has folded, "
+            f"got {path.gamma_max}"
+        )
+    for name in ("until", "save_at") if kinds else ():
+        value = getattr(path, name)
+        if value is not None:
+            raise ValueError(f"{name} cannot be given together with {kinds[0]}, got {value!r}")
 
 
 def _with_shapes(scene: Scene) -> Scene:
     """The scene with the ring at every state, and its softest modes."""
     return replace(scene, shapes=True, modes=True)
-
-
-def _record_landscape(landscape: Any, found: Any, file: File) -> bool:
-    """Write the recording of a landscape, that of a surface on it; say where that fails."""
-    from der.view_rerun import save_landscape
-
-    try:
-        save_landscape(landscape, file, surface=None if found is landscape else found)
-    except (OSError, ValueError) as wrong:
-        say(f"der: could not write {file}: {wrong}")
-        return False
-    return True
-
-
-def _write_landscape(found: Any, written: dict[str, File], code: int, *, quiet: bool) -> int:
-    """Write a landscape and its picture, say what there is to say, and return the exit code."""
-    from der.landscape_words import words
-
-    for name, file in written.items():
-        try:
-            if name == "plot":
-                _draw_landscape(found, file)
-            elif file != OUTPUT:
-                found.save(file)
-        except (OSError, ValueError) as wrong:
-            say(f"der: could not write {file}: {wrong}")
-            code = code or 3
-    if written.get("json") == OUTPUT:
-        return code if show(found.to_json().rstrip()) else code or 3
-    if not quiet and not show(words(found)):
-        code = code or 3
-    return code
-
-
-def _draw_landscape(found: Any, file: File) -> None:
-    from der import view_landscape as view
-    from der.landscape_push_record import LeastPush
-    from der.landscape_record import Landscape
-    from der.landscape_surface_record import Surface
-    from der.view_style import save_figure
-
-    if isinstance(found, Landscape):
-        figure = view.figure_of_landscape(found)
-    elif isinstance(found, Surface):
-        figure = view.figure_of_surface(found)
-    elif isinstance(found, LeastPush):
-        from der.view_push import figure_of_push
-
-        figure = figure_of_push(found)
-    else:
-        figure = view.figure_of_pass(found)
-    save_figure(figure, file)
 
 
 @dataclass(frozen=True)
@@ -684,7 +662,13 @@ class StatesOptions:
     gamma: Annotated[
         float | None, _number_option("Rotation of each grip, rad; the ring is free if not given.")
     ] = None
-    count: Annotated[int, typer.Option(parser=_whole, help="States after which to stop.")] = 12
+    count: Annotated[
+        int,
+        typer.Option(
+            parser=_whole,
+            help="States after which to stop; minima that these fall to are added.",
+        ),
+    ] = 12
     edges: Annotated[int, typer.Option(parser=_whole, help="Edges of the full ring.")] = 64
     json: Annotated[str | None, typer.Option(metavar="F", help="Write it here ('-': output).")] = (
         None
@@ -702,43 +686,31 @@ def states(ring: RingOptions, wanted: StatesOptions) -> int:
     from der.scene import Scene
 
     with _options_named():
-        scene = Scene(ring.ring(), ring.section(), n_edges=wanted.edges, a_over_t=ring.a_over_t)
+        whole = ring.ring()
+        divisor, piece = (4, "a quarter") if whole.symmetry == "D2" else (2, "half")
+        if wanted.edges % divisor:
+            raise ValueError(
+                f"edges must be divisible by {divisor}, as the path of twisting, where the search "
+                f"starts, is followed on {piece} of the ring, got {wanted.edges}"
+            )
+        scene = Scene(whole, ring.section(), n_edges=wanted.edges, a_over_t=ring.a_over_t)
         written = targets(wanted.json, wanted.plot, None, wanted.out, stem="states")
         from der.states_search import states as search
 
         with _counted("states", wanted.count, quiet=wanted.quiet) as tick:
             found = search(scene, gamma=wanted.gamma, count=wanted.count, progress=tick)
-    code = {"done": 0, "interrupted": 130}.get(found.status, 3)
-    if code:
-        file = written.setdefault("json", UNSAVED)
-        place = "on standard output" if file == OUTPUT else f"in {file}"
-        say(f"der: {found.message}; states that were found: {len(found)}, {place}")
-    return _write_states(found, written, code, quiet=wanted.quiet)
-
-
-def _write_states(found: States, written: dict[str, File], code: int, *, quiet: bool) -> int:
-    """Write states, their shapes and picture, say what there is to say; the exit code."""
+    from der.drawings import of_states
     from der.states_words import words
 
-    for name, file in written.items():
-        try:
-            if name == "plot" and len(found):
-                from der.view_states import figure_of_states
-                from der.view_style import save_figure
-
-                save_figure(figure_of_states(found), file)
-            elif name == "shapes" and found.shapes is not None:
-                found.shapes.save(file)
-            elif name == "json" and file != OUTPUT:
-                found.save(file)
-        except (OSError, ValueError) as wrong:
-            say(f"der: could not write {file}: {wrong}")
-            code = code or 3
-    if written.get("json") == OUTPUT:
-        return code if show(found.to_json().rstrip()) else code or 3
-    if not quiet and not show(words(found)):
-        code = code or 3
-    return code
+    return _hand_over(
+        found,
+        written,
+        {"done": 0, "interrupted": 130}.get(found.status, 3),
+        of_states(found),
+        lambda: words(found),
+        unfinished=f"{found.message}; states that were found: {len(found)},",
+        quiet=wanted.quiet,
+    )
 
 
 PHASES = {  # the diagrams of each shape, that of a cube last
@@ -783,6 +755,7 @@ def phase(
 ) -> None:
     """Map how rings fold over profile and cross-section: cases, sharp boundaries, a picture."""
     with _options_named():
+        check_named(out=out)
         from der.folding import fold as rod
         from validation.phase import FAMILIES, run_phase
 
@@ -828,10 +801,11 @@ def bench(
 ) -> None:
     """Measure time, memory and error of this package and its peers, on this machine, in one run."""
     with _options_named():
+        check_named(json=json, out=out)
         if json is not None:
             check_writable("json", File(json))
         folder = (
-            None if out is None else targets(None, None, None, out, stem="bench")["json"].parent
+            None if out is None else targets(None, None, None, out, stem="bench")["json"][0].parent
         )
         from validation.bench import PARTS, run
 
@@ -849,6 +823,7 @@ def stress(
     with _options_named():
         if quick and long:
             raise ValueError("quick cannot be given together with --long, got both")
+        check_named(json=json)
         if json is not None:
             check_writable("json", File(json))
         from validation.stress import stress as run
@@ -864,7 +839,7 @@ def stress(
 def _follow(
     run: Callable[[Callable[[float], object] | None], Path],
     scene: Scene,
-    written: dict[str, File],
+    written: Targets,
     other: Path | None,
     *,
     quiet: bool,
@@ -886,22 +861,47 @@ def _follow(
 
 
 def _finish(
-    path: Path, written: dict[str, File], code: int, other: Path | None = None, *, quiet: bool
+    path: Path, written: Targets, code: int, other: Path | None = None, *, quiet: bool
 ) -> int:
     """Write a path, finished or not, say what there is to say, and return the exit code."""
+    from der.drawings import of_path
+    from der.summary import summary
+
     if path.status != "done":
-        file = written.setdefault("json", UNSAVED)
-        written.setdefault("shapes", (UNSAVED if file == OUTPUT else file).with_suffix(".npz"))
-    if not write(path, written, other):
-        code = code or 3
+        keep_somewhere(written)
+    code = max(code, deliver(path, written, of_path(path, other)))
     if path.status != "done":
         say(f"der: {path.message}; {whereabouts(path, written)}")
-    if not quiet and written.get("json") != OUTPUT:
-        from der.summary import summary
+    return _tell(lambda: summary(path), written, code, quiet=quiet)
 
-        if not show(summary(path)):
-            code = code or 3
-    return code
+
+def _hand_over(
+    found: Record,
+    written: Targets,
+    code: int,
+    writers: Writers,
+    text: Callable[[], str],
+    *,
+    unfinished: str = "",
+    quiet: bool,
+) -> int:
+    """Write an answer and what is drawn of it, say what there is to say; the exit code.
+
+    ``unfinished`` begins the line that says where what was found of it is.
+    """
+    if code:
+        keep_somewhere(written)
+    written_code = deliver(found, written, writers)
+    if code:
+        say(f"der: {unfinished} {places(written, shapes='shapes' in writers)}")
+    return _tell(text, written, max(code, written_code), quiet=quiet)
+
+
+def _tell(text: Callable[[], str], written: Targets, code: int, *, quiet: bool) -> int:
+    """Print the summary of an answer, where output is not the record's; the exit code."""
+    if quiet or OUTPUT in written.get("json", ()):
+        return code
+    return code if show(text()) else max(code, 3)
 
 
 def _served(port: int) -> Live:

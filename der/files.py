@@ -9,6 +9,20 @@ from typing import BinaryIO, TypeAlias
 FilePath: TypeAlias = str | os.PathLike[str]
 
 
+def decoded(content: bytes) -> str:
+    """Text of a file's content.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise ValueError("no text file") from None
+
+
 def write_whole(path: FilePath, write: Callable[[BinaryIO], object]) -> None:
     """Write a file beside its target and rename it, so that the target is never half written.
 

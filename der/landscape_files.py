@@ -10,13 +10,13 @@ import json
 import os
 import pathlib
 from collections.abc import Callable, Mapping
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
 from der import checks
 from der.checks import Array, optional
-from der.files import FilePath, write_whole
+from der.files import FilePath, decoded, write_whole
 
 SCHEMA = 1
 T = TypeVar("T")
@@ -24,6 +24,8 @@ T = TypeVar("T")
 
 class OnDisk:
     """A record that writes itself as JSON, one entry a line, and reads itself again."""
+
+    KIND: ClassVar[str]  # the first entry: what it is a record of
 
     def entries(self) -> dict[str, object]:
         """What is written, by name."""
@@ -36,7 +38,7 @@ class OnDisk:
 
     def to_json(self) -> str:
         """JSON text of schema 1."""
-        entries = {"schema": SCHEMA, **self.entries()}
+        entries = {"kind": self.KIND, "schema": SCHEMA, **self.entries()}
         lines = [f'"{name}": {json.dumps(entries[name], allow_nan=False)}' for name in entries]
         return "{\n  " + ",\n  ".join(lines) + "\n}\n"
 
@@ -47,7 +49,8 @@ class OnDisk:
         Raises
         ------
         ValueError
-            If it is not JSON, of another schema, or not such a record; the message says where.
+            If it is not JSON, of another kind or schema, or not such a record; the message says
+            where.
         """
         try:
             given = json.loads(text)
@@ -55,6 +58,10 @@ class OnDisk:
             raise ValueError(f"not JSON: {problem}") from problem
         if not isinstance(given, dict):
             raise ValueError(f"not a record but a JSON {type(given).__name__}")
+        if "kind" not in given:
+            raise ValueError(f"not a record of {cls.KIND}")
+        if (kind := given.pop("kind")) != cls.KIND:
+            raise ValueError(f"kind is {checks.shown(kind)}, not {cls.KIND!r}")
         if (schema := given.pop("schema", None)) != SCHEMA:
             raise ValueError(f"schema is {checks.shown(schema)}, this version reads {SCHEMA}")
         entries = Entries("", given)
@@ -82,11 +89,12 @@ class OnDisk:
         OSError
             If the file cannot be read.
         ValueError
-            If it is broken or of another schema; the message names the file and what is wrong.
+            If it is broken or of another kind or schema; the message names the file and what is
+            wrong.
         """
         content = pathlib.Path(path).read_bytes()
         try:
-            return cls.from_json(content.decode())
+            return cls.from_json(decoded(content))
         except ValueError as problem:
             raise ValueError(f"{os.fspath(path)}: {problem}") from problem
 

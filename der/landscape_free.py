@@ -110,7 +110,7 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
         way,
         shapes,
         why,
-        "interrupted" if pressed else "done",
+        "interrupted" if pressed else "done" if rests else "not converged",
         {},
         time.perf_counter() - started,
     )

@@ -53,7 +53,8 @@ def least_push(
 
     Notes
     -----
-    Where the folded ring is no well there is nothing to push: ``why`` says so. With the scene's
+    Where the folded ring is no well there is nothing to push: ``why`` says so, and ``status`` where
+    not even the flat ring is at rest. With the scene's
     ``error_bars`` works are extrapolated, too; the search then stays on points of the coarsest
     mesh. Ctrl-C keeps the pushes found so far.
     """
@@ -62,6 +63,7 @@ def least_push(
     with interrupts_between_states() as pressed:
         alone = free_barrier(replace(scene, error_bars=False))
         search, why = _begun(scene, alone)
+        status = alone.status
         if search is not None and not pressed:
             scan(search, grid, pressed, progress)
             if between:
@@ -84,7 +86,7 @@ def least_push(
         search.least(dead=True) if search is not None else {},
         sure,
         why,
-        "interrupted" if pressed else "done",
+        "interrupted" if pressed else status,
         time.perf_counter() - started,
         _shapes(search) if search is not None else {},
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -106,6 +106,7 @@ class Push:
 class LeastPush(OnDisk):
     """The ways of pushing a folded ring open that were tried, and the one of least work."""
 
+    KIND: ClassVar[str] = "push"
     ring: Mapping[str, object]
     section: Mapping[str, object]
     numerics: Mapping[str, object]
@@ -118,7 +119,7 @@ class LeastPush(OnDisk):
     # "force", "couple": work of the least push; "force dead": of the dead load up to its limit;
     # "force dead load": that load
     why: str  # a sentence where there is none
-    status: str  # "done" or "interrupted"
+    status: str  # "done", "interrupted" or "not converged"
     solve_s: float
     shapes: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     # of "force", "couple dead", ...: vertices (N, 3) as it is let go or gets away, and the two

@@ -85,6 +85,7 @@ class Barriers:
 class Landscape(OnDisk):
     """Energy along the path of twisting, from the flat ring to the folded one."""
 
+    KIND: ClassVar[str] = "landscape"
     path: Path  # stable and unstable branches, all rests among its states
     rests: tuple[Rest, ...]  # in path order: the flat ring first
     folded: bool  # whether the last rest is the planar three-covered ring
@@ -161,6 +162,7 @@ class Landscape(OnDisk):
 class BarrierCurves(OnDisk):
     """Barriers over the section's h/t; NaN where there is none, or none is known."""
 
+    KIND: ClassVar[str] = "barriers"
     ring: Mapping[str, object]
     numerics: Mapping[str, object]
     h_over_t: Array  # (n,)
@@ -254,6 +256,7 @@ class Saddle:
 class Pass(OnDisk):
     """The lowest way found from flat to folded of the ring left alone in space."""
 
+    KIND: ClassVar[str] = "pass"
     ring: Mapping[str, object]
     section: Mapping[str, object]
     numerics: Mapping[str, object]
@@ -265,7 +268,7 @@ class Pass(OnDisk):
     way: Array  # (k, 2) progress [rad, root mean square] from flat, and energy, down both sides
     shapes: Array  # (k, N, 3) vertices on the way; not in the JSON
     why: str  # a sentence where there is no such way, or none is known
-    status: str  # "done" or "interrupted"
+    status: str  # "done", "interrupted" or "not converged"
     extrapolated: Mapping[str, tuple[float, float]]  # with error bars: of "fold" and "open"
     solve_s: float
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ class Surface(OnDisk):
     that of the full ring, and where it is not 0 a way down breaks the symmetry.
     """
 
+    KIND: ClassVar[str] = "surface"
     ring: Mapping[str, object]
     section: Mapping[str, object]
     numerics: Mapping[str, object]

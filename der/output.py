@@ -5,14 +5,30 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path as File
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 if TYPE_CHECKING:
+    from der.files import FilePath
     from der.record import Path
 
-UNSAVED = File("der-unfinished.json")  # where an unfinished path goes if no file was named
+UNSAVED = File("der-unfinished.json")  # where what is unfinished goes if no file was named
 OUTPUT = File("-")  # standard output
+DRAWN = ("plot", "rrd", "html", "movie")  # the quick ones first
+
+Targets: TypeAlias = dict[str, list[File]]  # by option, that of --out first
+Writers: TypeAlias = Mapping[str, Callable[[File], object] | str]  # or why there is nothing to draw
+
+
+class Record(Protocol):
+    """What every answer can do."""
+
+    def save(self, path: FilePath) -> None:
+        """Write JSON."""
+
+    def to_json(self) -> str:
+        """JSON text."""
 
 
 def say(line: str) -> None:
@@ -33,6 +49,16 @@ def show(text: str) -> bool:
     return True
 
 
+# --- Before the work -------------------------------------------------------------------------
+
+
+def check_named(**given: str | None) -> None:
+    """Raise ValueError where the next option was taken for a file's name."""
+    for name, value in given.items():
+        if value is not None and value.startswith("-") and (name, value) != ("json", "-"):
+            raise ValueError(f"{name} must be a file name, got {value!r}")
+
+
 def targets(
     json: str | None,
     plot: str | None,
@@ -42,47 +68,50 @@ def targets(
     movie: str | None = None,
     html: str | None = None,
     stem: str = "path",
-) -> dict[str, File]:
-    """The files to write, after making sure that they can be written."""
-    files: dict[str, File] = {}
+    shapes: bool = True,
+) -> Targets:
+    """The files to write, after making sure that they can be written.
+
+    A folder gets all of its own, whatever else is named.
+    """
+    check_named(json=json, plot=plot, rrd=rrd, out=out, movie=movie, html=html)
+    files: Targets = {}
     if out is not None:
         folder = File(out)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as wrong:
             raise ValueError(f"out must be a folder, got {out!r}: {wrong.strerror}") from None
-        files = {
-            "json": folder / f"{stem}.json",
-            "plot": folder / f"{stem}.png",
-            "shapes": folder / "shapes.npz",
-        }
-    if json is not None:
-        files["json"] = File(json)
+        files = {"json": [folder / f"{stem}.json"], "plot": [folder / f"{stem}.png"]}
+        if shapes:
+            files["shapes"] = [folder / "shapes.npz"]
     if plot is not None:
         from der.view_plots import FORMATS
 
         if File(plot).suffix not in FORMATS:
             raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
-        files["plot"] = File(plot)
-    if rrd is not None:
-        if File(rrd).suffix != ".rrd":
-            raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
-        files["rrd"] = File(rrd)
+    if rrd is not None and File(rrd).suffix != ".rrd":
+        raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
     if movie is not None:
         from der.view_movie import check_movie
 
         check_movie(movie)
-        files["movie"] = File(movie)
     if html is not None:
         from der.view_html import check_html
 
         check_html(html)
-        files["html"] = File(html)
-    if files.get("json") in [files[name] for name in files if name != "json"]:
-        raise ValueError(f"json must be a file of its own, got {json!r} twice")
-    for name, file in files.items():
-        if file != OUTPUT:
-            check_writable(name if name != "shapes" else "out", file)
+    named = {"json": json, "plot": plot, "rrd": rrd, "movie": movie, "html": html}
+    for name, given in named.items():
+        if given is not None and File(given) not in files.setdefault(name, []):
+            files[name].append(File(given))
+    others = [file for name, some in files.items() if name != "json" for file in some]
+    for file in files.get("json", []):
+        if file in others:
+            raise ValueError(f"json must be a file of its own, got {str(file)!r} twice")
+    for name, some in files.items():
+        for file in some:
+            if file != OUTPUT:
+                check_writable(name if name != "shapes" else "out", file)
     return files
 
 
@@ -102,18 +131,6 @@ def check_writable(name: str, file: File) -> None:
         ) from None
 
 
-def whereabouts(path: Path, targets: dict[str, File]) -> str:
-    """Where an unfinished path went, and how far it got."""
-    file = targets["json"]
-    place = "on standard output" if file == OUTPUT else f"in {file}"
-    if not len(path):
-        return f"the record, without any state, is {place}"
-    last = f"at gamma = {path.gamma[-1]:.8g}"
-    return (
-        f"the path up to its last good state, {last}, is {place}, its shapes in {targets['shapes']}"
-    )
-
-
 def kept(folder: str) -> Path:
     """The path that an earlier command has kept in its --out folder, with its shapes.
 
@@ -127,6 +144,7 @@ def kept(folder: str) -> Path:
     from der.record import Path
     from der.shapes import Shapes
 
+    check_named(beside=folder)
     try:
         path = Path.load(File(folder) / "path.json")
         path = replace(path, shapes=Shapes.load(File(folder) / "shapes.npz"))
@@ -144,46 +162,111 @@ def kept(folder: str) -> Path:
     return path
 
 
-def write(path: Path, targets: dict[str, File], other: Path | None = None) -> bool:
-    """Write the record first, then what goes with it; say what could not be written.
+# --- After it --------------------------------------------------------------------------------
 
-    Where there is an ``other`` path, what moves shows it, too.
 
-    A record that cannot be written where it should goes to standard output, also in ``targets``:
-    nothing already computed is lost.
+def keep_somewhere(targets: Targets) -> None:
+    """Name files for the record and its shapes where there are none: what is found is kept."""
+    file = targets.setdefault("json", [UNSAVED])[-1]
+    targets.setdefault("shapes", [(UNSAVED if file == OUTPUT else file).with_suffix(".npz")])
+
+
+def places(targets: Targets, *, shapes: bool = False) -> str:
+    """Where the record is, and the shapes."""
+    words = ["on standard output" if file == OUTPUT else f"in {file}" for file in targets["json"]]
+    where = " and ".join(words)
+    return f"{where}, shapes in {_listed(targets['shapes'])}" if shapes else where
+
+
+def whereabouts(path: Path, targets: Targets) -> str:
+    """Where an unfinished path went, and how far it got."""
+    if not len(path):
+        return f"the record, without any state, is {places(targets)}"
+    last = f"at gamma = {path.gamma[-1]:.8g}"
+    return (
+        f"the path up to its last good state, {last}, is {places(targets)}, "
+        f"its shapes in {_listed(targets['shapes'])}"
+    )
+
+
+def deliver(record: Record, targets: Targets, writers: Writers) -> int:
+    """Write the record first, then what is drawn of it; say what could not be; the exit code.
+
+    A record that can be written nowhere goes to standard output, also in ``targets``, and one that
+    nobody wanted is kept where Ctrl-C stops the drawing: nothing already computed is lost.
     """
-    done = True
-    shown = path if other is None else [path, other]
-    for name in ("json", "shapes", "plot", "rrd", "html", "movie"):
-        file = targets.get(name)
-        if file is None:
-            continue
+    from der.unfinished import interrupts_between_states
+
+    with interrupts_between_states() as pressed:
+        done = _keep(record, targets, writers)
+    missing = [(name, file) for name in DRAWN for file in targets.get(name, ())]
+    drawn: list[File] = []
+    while missing and not pressed:
+        name, file = missing[0]
+        writer = writers[name]
         try:
-            if name == "json" and file != OUTPUT:
-                path.save(file)
-            elif name == "shapes" and path.shapes is not None:
-                path.shapes.save(file)
-            elif name == "plot" and len(path) > 1:
-                from der.view_plots import save_plot
+            if isinstance(writer, str):
+                say(f"der: {file} was not drawn: {writer}")
+            else:
+                writer(file)
+                drawn.append(file)
+        except KeyboardInterrupt:
+            pressed.append(1)
+        except (OSError, ValueError) as wrong:
+            if _stopped(wrong):
+                pressed.append(1)
+            else:
+                say(f"der: could not write {file}: {wrong}")
+                done = False
+        if not pressed:
+            del missing[0]
+    if not missing:
+        return 0 if done else 3
+    with interrupts_between_states():
+        if "json" not in targets:
+            keep_somewhere(targets)
+            _keep(record, targets, writers)
+    also = f"; written: {_listed(drawn)}" if drawn else ""
+    lost = _listed(file for _, file in missing)
+    say(f"der: stopped by the user; the record is {places(targets)}{also}; not written: {lost}")
+    return 130
 
-                save_plot(path, file)
-            elif name == "rrd" and len(path) > 1:
-                from der.view_rerun import save_recording
 
-                save_recording(shown, file)
-            elif name == "html" and len(path) > 1:
-                from der.view_html import save_html
-
-                save_html(shown, file)
-            elif name == "movie" and len(path) > 1:
-                from der.view_movie import save_movie
-
-                save_movie(shown, file)
+def _keep(record: Record, targets: Targets, writers: Writers) -> bool:
+    """Write the record and its shapes."""
+    done = True
+    good: list[File] = []
+    for file in targets.get("json", ()):
+        try:
+            if file != OUTPUT:
+                record.save(file)
+            good.append(file)
         except (OSError, ValueError) as wrong:
             done = False
             say(f"der: could not write {file}: {wrong}")
-            if name == "json":
-                targets["json"] = OUTPUT
-        if name == "json" and targets["json"] == OUTPUT:
-            done = show(path.to_json()) and done
+    if "json" in targets:
+        targets["json"] = good or [OUTPUT]
+        if OUTPUT in targets["json"]:
+            done = show(record.to_json().rstrip()) and done
+    writer = writers.get("shapes")
+    for file in targets.get("shapes", ()):
+        try:
+            if callable(writer):
+                writer(file)
+        except (OSError, ValueError) as wrong:
+            done = False
+            say(f"der: could not write {file}: {wrong}")
     return done
+
+
+def _stopped(wrong: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: it also stops programs that draw for us."""
+    while wrong is not None:
+        if isinstance(wrong, KeyboardInterrupt):
+            return True
+        wrong = wrong.__context__
+    return False
+
+
+def _listed(files: Iterable[File]) -> str:
+    return ", ".join(str(file) for file in files)

@@ -34,7 +34,9 @@ def read_profile(file: str) -> Ring:
         return profile(**entries)  # type: ignore[arg-type]
     except OSError as wrong:
         raise ValueError(f"file must be readable, got {file!r}: {wrong.strerror}") from None
-    except (ValueError, TypeError) as wrong:
+    except UnicodeDecodeError:
+        raise ValueError(f"file must be a text file, got {file!r}") from None
+    except (ValueError, TypeError, csv.Error) as wrong:
         raise ValueError(f"file {file!r}: {wrong}") from None
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from der import checks
 from der.checks import Array, Counts, optional
-from der.files import FilePath, write_whole
+from der.files import FilePath, decoded, write_whole
 from der.shapes import Shapes
 
 SCHEMA = 1
@@ -223,6 +223,8 @@ class Path:
             raise ValueError(f"not JSON: {problem}") from problem
         if not isinstance(entries, dict):
             raise ValueError(f"not a record but a JSON {type(entries).__name__}")
+        if "kind" in entries:  # of landscapes and states
+            raise ValueError(f"not a path but a record of kind {checks.shown(entries['kind'])}")
         if (schema := entries.pop("schema", None)) != SCHEMA:
             raise ValueError(f"schema is {schema!r}, this version reads {SCHEMA}")
         if not isinstance(entries.get("points"), list):
@@ -262,7 +264,7 @@ class Path:
         """
         content = pathlib.Path(path).read_bytes()
         try:
-            return cls.from_json(content.decode())
+            return cls.from_json(decoded(content))
         except ValueError as problem:
             raise ValueError(f"{os.fspath(path)}: {problem}") from problem
 

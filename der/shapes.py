@@ -134,13 +134,16 @@ class Shapes:
         """
         with open(path, "rb") as file:
             try:
-                with np.load(file, allow_pickle=False) as arrays:
-                    places = arrays.get("arc_length")
-                    x, frames = arrays["x"], arrays["frames"]
-                    return cls(x, frames, _falls(arrays), _softest(arrays), places)
+                with np.load(file, allow_pickle=False) as npz:
+                    arrays = {name: npz[name] for name in npz.files}
+                x, frames, places = arrays["x"], arrays["frames"], arrays.get("arc_length")
+                falls, modes = _falls(arrays), _softest(arrays)
             except Exception as problem:  # zipfile and numpy raise some ten classes on broken files
-                words = " ".join(str(problem).split())
-                raise ValueError(f"{os.fspath(path)}: no shapes in it: {words}") from problem
+                raise ValueError(f"{os.fspath(path)}: no shapes.npz as --out writes") from problem
+        try:
+            return cls(x, frames, falls, modes, places)
+        except ValueError as problem:
+            raise ValueError(f"{os.fspath(path)}: {problem}") from problem
 
 
 def _keep(record: object, called: str, name: str, shape: tuple[int | str, ...]) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Self
+from typing import ClassVar, Self
 
 from der import checks
 from der.landscape_files import Entries, OnDisk, seconds
@@ -59,8 +59,13 @@ class Transition:
 
 @dataclass(frozen=True, eq=False)
 class States(OnDisk):
-    """The states of a ring that were found, lowest first, and the falls between them."""
+    """The states of a ring that were found, lowest first, and the falls between them.
 
+    `load` reads what `save` or ``der states --out`` has written. The shapes of the states are in a
+    file of their own, ``der.Shapes.load("shapes.npz")``, in the order of the states.
+    """
+
+    KIND: ClassVar[str] = "states"
     ring: Mapping[str, object]
     section: Mapping[str, object]
     numerics: Mapping[str, object]
@@ -84,6 +89,14 @@ class States(OnDisk):
             for name in (fall.start, *fall.via, *([] if fall.end is None else [fall.end])):
                 if name not in names:
                     raise ValueError(f"transitions must be between states, got {name!r}")
+
+    def __repr__(self) -> str:
+        """Which ring, how many states, and how the search ended."""
+        place = "free" if self.gamma is None else f"gamma={self.gamma:.6g}"
+        return (
+            f"States({self.ring.get('shape')}, {place}, {len(self)} states, "
+            f"{len(self.minima)} minima, {self.status})"
+        )
 
     def __len__(self) -> int:
         return len(self.states)

@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 
 from der.checks import checked_number, shown
+from der.equilibrium import ADVICE, equilibrium
 from der.frames import rotation
 from der.landscape_alone import Alone
 from der.landscape_curve import numerics, scene_sector
@@ -85,7 +86,8 @@ def states(
     if pressed:
         found = replace(found, status="interrupted", message="stopped by the user")
     elif not len(found):
-        found = replace(found, status="not converged", message="no state was found from any start")
+        message = f"no state was found from any start{_flat(whole, scene.tolerance)}"
+        found = replace(found, status="not converged", message=message)
     return replace(found, solve_s=time.perf_counter() - began)
 
 
@@ -100,6 +102,12 @@ def check(scene: Scene, gamma: float | None, count: int) -> None:
         checked_number("gamma", gamma, allowed, lambda g: 0.0 <= g <= 2.0 * math.pi)
     if scene.n_edges > _MOST_EDGES:
         raise ValueError(f"n_edges must be at most {_MOST_EDGES} here, got {scene.n_edges}")
+
+
+def _flat(whole: Sector, tolerance: float) -> str:
+    """What the solver says of the flat ring, where that is not at rest."""
+    at = equilibrium(whole.body, whole.held, whole.start, tolerance=tolerance)
+    return "" if at.converged else f"; the flat ring is no equilibrium: {ADVICE[at.outcome]}"
 
 
 @dataclass

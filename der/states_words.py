@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from der.states_record import RingState, States
-from der.summary import titled
+from der.summary import known_to, number, titled
 
 
 def words(found: States) -> str:
@@ -12,30 +12,39 @@ def words(found: States) -> str:
     lines = [f"{titled(found.ring, found.section, found.numerics)}, {place}"]
     gripped = found.gamma is not None
     wide = max([len(state.name) for state in found.states], default=5) + 2
-    more = f"{'M a/GJ':>12}{'grips':>9}" if gripped else ""
+    more = f"{'M a/GJ':>12}{'distance a':>12}" if gripped else ""
     lines += ["", f"{'state':{wide}}{'U a/GJ':>14}{'index':>7}{more}  {'link':>4}  falls to"]
     lines += [_row(found, state, wide) for state in found.states]
     lines += ["", _search(found)]
+    if any(state.link is not None for state in found.states):
+        lines.append(
+            "link: times that the bar's edge winds around its middle; none where strands touch"
+        )
     if any(state.needs_cut for state in found.states):
         lines.append("c: of a ring that was cut, turned once about itself and joined again")
+    if gripped and len(found):
+        lines.append("distance: between the grips, in units of a")
     if found.message:
         lines.append(f"{found.status}: {found.message}")
     return "\n".join(lines)
 
 
 def _row(found: States, state: RingState, wide: int) -> str:
+    floor = known_to(found.numerics)
     index = "?" if state.index is None else str(state.index)
     more = ""
     if state.moment is not None and state.distance is not None:
-        more = f"{state.moment:12.7f}{state.distance:9.5f}"
+        more = number(state.moment, "12.7f", floor) + number(state.distance, "12.5f")
     link = "" if state.link is None else str(state.link)
     mark = "c" if state.needs_cut else " "
     ends = ", ".join(
-        f"{end} ({state.energy - found[end].energy:.6g})" for end in found.falls_to(state.name)
+        f"{end} ({number(state.energy - found[end].energy, '.6g', floor)})"
+        for end in found.falls_to(state.name)
     )
     if not ends:
         ends = "stays" if state.stable else "?"
-    return f"{state.name:{wide}}{state.energy:14.8f}{index:>7}{more}  {link:>4}{mark} {ends}"
+    energy = number(state.energy, "14.8f")
+    return f"{state.name:{wide}}{energy}{index:>7}{more}  {link:>4}{mark} {ends}"
 
 
 def _search(found: States) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from der.record import AtPi, Mode, Path, Point
 
+_KNOWN = 1e-10  # GJ/a: of numbers whose record says no tolerance
 _FAR = 1e-2  # rad: a snap over more, under a dead moment, says where it began
 
 
@@ -24,7 +25,7 @@ def summary(path: Path) -> str:
         lines += ["", f"{'':9}{'gamma':>12}{'gamma/pi':>10}{'M a/GJ':>12}{'U a/GJ':>12}  index"]
         lines += [_row(point) for point in path.points]
     if path.at_pi is not None:
-        lines += ["", _at_pi(path.at_pi)]
+        lines += ["", _at_pi(path.at_pi, known_to(path.numerics))]
     if path.error is not None:
         lines.append(_errors(path))
     t = path.timing
@@ -45,6 +46,17 @@ def _errors(path: Path) -> str:
     missing = sum(e is None for e in error["moment"])
     none = f"; none at {missing} of {len(path)} states" if missing else ""
     return f"error bars, at most: {', '.join(words)}{none}"
+
+
+def number(value: float, form: str, floor: float = 0.0) -> str:
+    """A number as text: 0 without a sign where it is below ``floor`` or its last digit."""
+    text = f"{value:{form}}"
+    return f"{0.0:{form}}" if abs(value) <= floor or float(text) == 0.0 else text
+
+
+def known_to(numerics: Mapping[str, Any]) -> float:
+    """What moments and energies are known to, GJ/a, by the tolerance on record."""
+    return float(numerics.get("tolerance", _KNOWN))
 
 
 def headline(path: Path) -> str:
@@ -78,7 +90,8 @@ def mode_in_words(mode: Mode) -> str:
         words.append("stable when folded" if mode.stable else "unstable when folded")
     words.append("no snap" if mode.snapping == "none" else mode.snapping)
     if mode.stable_3d is not None:
-        words.append("stable in 3D at pi" if mode.stable_3d else "unstable in 3D at pi")
+        stable = "stable" if mode.stable_3d else "unstable"
+        words.append(f"{stable} in 3D at pi (moment held)")
     return ", ".join(words)
 
 
@@ -91,11 +104,12 @@ def _row(point: Point) -> str:
         start = point.details.get("gamma_fold")
         if isinstance(start, float) and abs(start - point.gamma) > _FAR:
             extra += f", from gamma = {start:.7g}"
-    numbers = f"{point.gamma:12.8f}{point.gamma / math.pi:10.6f}{point.moment:12.7f}"
-    return f"{point.kind:9}{numbers}{point.energy:12.7f}  {index:7} {extra}".rstrip()
+    shown = ((point.gamma, "12.8f"), (point.gamma / math.pi, "10.6f"), (point.moment, "12.7f"))
+    numbers = "".join(number(*one) for one in (*shown, (point.energy, "12.7f")))
+    return f"{point.kind:9}{numbers}  {index:7} {extra}".rstrip()
 
 
-def _at_pi(at: AtPi) -> str:
+def _at_pi(at: AtPi, floor: float) -> str:
     index = ", ".join(
         f"{name} {'unknown' if value is None else value}"
         for name, value in (
@@ -104,4 +118,5 @@ def _at_pi(at: AtPi) -> str:
             ("grips removed", at.index_free),
         )
     )
-    return f"at pi: M = {at.moment:.7g}, dM/dgamma = {at.slope:.7g}, U = {at.energy:.10g}; {index}"
+    moment, energy = number(at.moment, ".7g", floor), number(at.energy, ".10g", floor)
+    return f"at pi: M = {moment}, dM/dgamma = {at.slope:.7g}, U = {energy}; {index}"

@@ -182,7 +182,7 @@ WRONG = [
     ),
     (shape("triangle", "--r-over-a", "0.1"), "--vertex-angle", "none", "given"),
     (shape("profile"), "FILE", "None", "profile"),
-    (shape("profile", "no.csv"), "--file", "'no.csv'", "readable"),
+    (shape("profile", "no.csv"), "FILE", "'no.csv'", "readable"),
     (("bvp", *line()[1:], "--tolerance", "1"), "--tolerance", "1.0", "1e-11 to 0.001"),
     (("bvp", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
     (("bvp", *line()[1:], "--sector", "full"), "--sector", "'full'", "half or quarter"),
@@ -194,6 +194,19 @@ WRONG = [
     (("landscape", *line()[1:], "--push", "--free"), "--push", "both", "--free"),
     (("landscape", *line()[1:], "--push", "--two-dimensional"), "--push", "both", "together"),
     (("landscape", *line()[1:], "--cells", "2"), "--cells", "2", "from 3 to 1000"),
+    (("landscape", *line()[1:], "--cells", "7"), "--cells", "7", "--two-dimensional"),
+    (("landscape", *line()[1:], "--push", "--rrd", "f.rrd"), "--rrd", "'f.rrd'", "with --push"),
+    (("landscape", *line()[1:], "--push", "--save-at", "1"), "--save-at", "'1'", "with --push"),
+    (("landscape", *line()[1:], "--push", "--until", "folded"), "--until", "'folded'", "--push"),
+    (("landscape", *line()[1:], "--gamma-max", "1"), "--gamma-max", "1.0", "for a landscape"),
+    (("landscape", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
+    *(
+        (line(option, "--quiet"), option, "'--quiet'", "must be a file name")
+        for option in ("--json", "--plot", "--rrd", "--movie", "--html", "--out")
+    ),
+    (line("--html", "x.html", "--beside", "--quiet"), "--beside", "'--quiet'", "a file name"),
+    (("states", *line()[1:], "--json", "--quiet"), "--json", "'--quiet'", "a file name"),
+    (("states", *line()[1:], "--edges", "66"), "--edges", "66", "divisible by 4, as the path"),
     (("phase", "square", "--out", "d"), "SHAPE", "'square'", "ellipse"),
     (("phase", "ellipse", "--out", "d", "--check", "rod"), "--check", "'rod'", "'der'"),
     (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
@@ -717,3 +730,116 @@ def test_a_push_at_a_ring_that_opens_by_itself(run, tmp_path):
     assert (code, err) == (0, [])
     assert "the folded ring is no well" in out
     assert entries(file.read_text())["pushes"] == []
+
+
+def test_a_folder_is_complete_whatever_else_is_named(run):
+    """--json and --plot come besides; --beside takes such a folder and names what is bad."""
+    words = (*SMALL, "--gamma-max", "0.5", "--quiet")
+    code, _, err = run(*words, "--out", "d", "--json", "f.json", "--plot", "p.png")
+    assert (code, err) == (0, [])
+    assert {f.name for f in File("d").iterdir()} == {"path.json", "path.png", "shapes.npz"}
+    assert File("f.json").read_text() == File("d/path.json").read_text()
+    assert File("p.png").read_bytes().startswith(b"\x89PNG")
+    assert run(*words, "--beside", "d", "--html", "x.html")[0] == 0
+    for name, why in (("shapes.npz", "no shapes.npz as --out writes"), ("path.json", "no text")):
+        File("d", name).write_bytes(b"\xff\xfe\x00")
+        code, _, err = run(*words, "--beside", "d", "--html", "x.html")
+        assert code == 2
+        assert err[0].startswith("der: --beside must be a folder as --out writes")
+        assert why in err[0]
+
+
+def test_a_landscape_fills_its_folder_and_the_named_files(run):
+    """Likewise."""
+    words = ("landscape", "circle", "--h-over-t", "4", "--edges", "32", "--quiet")
+    code, _, err = run(*words, "--out", "d", "--json", "f.json")
+    assert (code, err) == (0, [])
+    assert {f.name for f in File("d").iterdir()} == {"landscape.json", "landscape.png"}
+    assert File("f.json").read_text() == File("d/landscape.json").read_text()
+
+
+def test_a_binary_profile_is_named(run):
+    """Without a word about codecs."""
+    File("p.csv").write_bytes(b"\xff\xfe\x00")
+    code, _, err = run(*shape("profile", "p.csv"))
+    assert (code, err) == (2, ["der: FILE must be a text file, got 'p.csv'"])
+
+
+@pytest.mark.parametrize("kind", [(), ("--push",), ("--free",)])
+def test_a_flat_ring_that_is_no_equilibrium_has_no_landscape(run, kind):
+    """Code 3; the reason once, on standard error, with the file that holds what was found."""
+    words = ("landscape", "circle", "--h-over-t", "1e9", "--edges", "32", *kind)
+    code, out, err = run(*words)
+    assert code == 3
+    assert len(err) == 1
+    assert err[0].startswith("der: the flat ring is no equilibrium: ")
+    assert err[0].endswith("; what was found is in der-unfinished.json")
+    assert "no equilibrium" not in out
+    assert entries(File("der-unfinished.json").read_text())["kind"] == (kind or ["--landscape"])[0][
+        2:
+    ].replace("free", "pass")
+
+
+def test_states_say_why_none_was_found(run):
+    """What the solver said of the flat ring."""
+    words = ("states", "circle", "--h-over-t", "1e9", "--edges", "16", "--gamma", "1", "--quiet")
+    code, _, err = run(*words)
+    assert code == 3
+    assert "no state was found from any start; the flat ring is no equilibrium: " in err[0]
+
+
+@pytest.mark.parametrize("more", [(), ("--plot", "p.png")])
+def test_where_there_is_no_push_there_is_no_picture(run, more):
+    """Said in one line; the code is that of the answer, which is no failure."""
+    words = ("landscape", "circle", "--h-over-t", "1", "--edges", "32", "--push", *more)
+    code, out, err = run(*words)
+    assert code == 0
+    assert "the folded ring is no well" in out
+    assert err == ["der: p.png was not drawn: there is no push that opens the ring"] * bool(more)
+
+
+def stop(*_):
+    """What Ctrl-C does, and a program that draws for us, too."""
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt:
+        raise ValueError("ffmpeg ended") from None
+
+
+@pytest.mark.parametrize("how", ["itself", "behind another"])
+@pytest.mark.parametrize(("named", "place"), [((), "der-unfinished.json"), (("--out", "d"), "d")])
+def test_ctrl_c_while_files_are_written_keeps_the_record(run, monkeypatch, named, place, how):
+    """Code 130; one line says where the record is, what else was written and what was not."""
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("der.view_movie.save_movie", interrupt if how == "itself" else stop)
+    code, out, err = run(*SMALL, "--gamma-max", "0.5", "--movie", "m.gif", *named, "--quiet")
+    assert (code, out) == (130, "")
+    file = "d/path.json" if named else place
+    also = "; written: d/path.png" if named else ""
+    assert err == [f"der: stopped by the user; the record is in {file}{also}; not written: m.gif"]
+    assert saved(file).status == "done"
+    assert len(Shapes.load(File("d/shapes.npz" if named else "der-unfinished.npz")).x) > 1
+
+
+@pytest.mark.parametrize("kind", [(), ("--push",)])
+def test_an_interrupted_landscape_names_its_file(run, monkeypatch, kind):
+    """As states do."""
+    home = "der.landscape_push" if kind else "der.landscape_curve"
+    module = __import__(home, fromlist=["x"])
+    name = "scan" if kind else "follow"
+    real = getattr(module, name)
+
+    def pressed(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return [] if kind else real(*arguments)
+
+    monkeypatch.setattr(module, name, pressed)
+    words = ("landscape", "circle", "--h-over-t", "4", "--edges", "32", "--quiet", *kind)
+    code, out, err = run(*words)
+    assert (code, out, len(err)) == (130, "", 1)
+    assert err[0].startswith("der: stopped by the user")
+    assert err[0].endswith("; what was found is in der-unfinished.json")
+    assert entries(File("der-unfinished.json").read_text())["status"] == "interrupted"

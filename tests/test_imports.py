@@ -103,7 +103,7 @@ ROOMS = {
         "view_states",
         "view_push",
     ),
-    "roof": ("output", "landscape_words", "states_words", "cli", "__main__"),
+    "roof": ("output", "drawings", "landscape_words", "states_words", "cli", "__main__"),
 }
 # What each room may import from besides itself.
 BELOW = {

@@ -294,6 +294,35 @@ def test_a_broken_record_is_refused(change, message):
         States.from_json(json.dumps(entries))
 
 
+def test_a_record_of_another_kind_is_named():
+    """Its kind, and not its content."""
+    text = sample().to_json()
+    for old, new, message in (
+        ('"kind": "states"', '"kind": "push"', "^kind is 'push', not 'states'$"),
+        ('"kind": "states",', "", "^not a record of states$"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            States.from_json(text.replace(old, new, 1))
+    with pytest.raises(ValueError, match=r"^not a path but a record of kind 'states'$"):
+        der.Path.from_json(text)
+
+
+def test_states_are_short_in_print():
+    """Not all their numbers."""
+    assert repr(sample()) == "States(circle, free, 3 states, 1 minima, done)"
+
+
+def test_rounding_is_not_printed():
+    """Zeros have no sign; heads and footnotes say what is meant."""
+    from der.states_words import words
+
+    flat = RingState("flat", -6e-16, 0, 1e-12, True, 1, 0, 0.0, 0.0, False, 1, 1, 0, -2e-15, 2.0)
+    said = words(sample(gamma=0.0, states=(flat,), transitions=()))
+    assert "distance a" in said
+    assert "-0.0" not in said
+    assert "link: " in said
+
+
 def test_a_file_that_is_no_record_is_named(tmp_path):
     (tmp_path / "x.json").write_text("{")
     with pytest.raises(ValueError, match=r"x\.json: not JSON"):
@@ -394,7 +423,7 @@ def test_an_unfinished_search_is_saved(capsys, tmp_path, monkeypatch, status, co
     [
         (("--gamma", "7"), "der: --gamma must be a number from 0 to 2 pi, got 7.0"),
         (("--count", "0"), "der: --count must be a whole number from 1 to 200, got 0"),
-        (("--edges", "30"), "der: --edges must be from 8 to 65536 and divisible by 4"),
+        (("--edges", "30"), "der: --edges must be divisible by 4, as the path of twisting"),
         (("--edges", "2048"), "der: --edges must be at most 1024"),
         (("--plot", "x.txt"), "der: --plot must end in"),
     ],

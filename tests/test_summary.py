@@ -150,3 +150,11 @@ def test_a_snap_says_what_it_releases_and_where_it_began():
         details = {"energy_released": 2.0, "gamma_fold": start}
         rows = lines(points=(Point("snap", 2.5, 1.5, 7.0, 0, 0, 1, details),))
         assert any(row.endswith(end) for row in rows)
+
+
+def test_a_moment_below_the_tolerance_is_zero():
+    """Its digits are rounding."""
+    words = lines(at_pi=AtPi(-1.9e-15, -0.5, 9.5, 1, 2, None), numerics={"tolerance": 1e-10})
+    assert any(line.startswith("at pi: M = 0, ") for line in words)
+    words = lines(at_pi=AtPi(-1.9e-5, -0.5, 9.5, 1, 2, None), numerics={"tolerance": 1e-10})
+    assert any(line.startswith("at pi: M = -1.9e-05, ") for line in words)

@@ -1,0 +1,113 @@
+"""What is drawn of each answer of the command: writers by the option that asks for them.
+
+Views are imported when they draw. A sentence in place of a writer says why there is nothing to see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
+
+from der.output import DRAWN
+
+if TYPE_CHECKING:
+    from der.landscape_record import Landscape
+    from der.output import Writers
+    from der.record import Path
+    from der.states_record import States
+
+
+def of_path(path: Path, other: Path | None = None) -> Writers:
+    """Of a path; where there is another, what moves shows it, too."""
+    shown = path if other is None else [path, other]
+
+    def plot(file: File) -> None:
+        from der.view_plots import save_plot
+
+        save_plot(path, file)
+
+    def rrd(file: File) -> None:
+        from der.view_rerun import save_recording
+
+        save_recording(shown, file)
+
+    def html(file: File) -> None:
+        from der.view_html import save_html
+
+        save_html(shown, file)
+
+    def movie(file: File) -> None:
+        from der.view_movie import save_movie
+
+        save_movie(shown, file)
+
+    drawn: Writers = {"plot": plot, "rrd": rrd, "html": html, "movie": movie}
+    if len(path) < 2:
+        drawn = dict.fromkeys(DRAWN, "there is no path of two states")
+    return {**drawn, **_shapes(path)}
+
+
+def of_landscape(found: Any, along: Callable[[], Landscape]) -> Writers:
+    """Of any landscape; ``along``: the one along the path of twisting, for what is played back."""
+    from der import landscape_record, landscape_surface_record
+    from der.landscape_push_record import LeastPush
+
+    empty = ""
+    if isinstance(found, landscape_record.Landscape) and not len(found.path):
+        empty = "there is no state"
+    elif isinstance(found, landscape_surface_record.Surface) and not found.count.any():
+        empty = "there is no minimum in any cell"
+    elif isinstance(found, LeastPush) and found.best is None:
+        empty = "there is no push that opens the ring"
+    elif isinstance(found, landscape_record.Pass) and found.saddle is None:
+        empty = "there is no saddle to cross"
+
+    def plot(file: File) -> None:
+        from der.view_style import save_figure
+
+        save_figure(_figure(found), file)
+
+    def rrd(file: File) -> None:
+        from der.view_rerun import save_landscape
+
+        one = along()
+        if one is not found and one.status == "interrupted":
+            raise KeyboardInterrupt
+        save_landscape(one, file, surface=None if one is found else found)
+
+    return {"plot": empty or plot, "rrd": empty or rrd}
+
+
+def _figure(found: Any) -> Any:
+    from der import view_landscape as view
+    from der.landscape_push_record import LeastPush
+    from der.landscape_record import Landscape
+    from der.landscape_surface_record import Surface
+
+    if isinstance(found, Landscape):
+        return view.figure_of_landscape(found)
+    if isinstance(found, Surface):
+        return view.figure_of_surface(found)
+    if isinstance(found, LeastPush):
+        from der.view_push import figure_of_push
+
+        return figure_of_push(found)
+    return view.figure_of_pass(found)
+
+
+def of_states(found: States) -> Writers:
+    """Of the states of a ring."""
+
+    def plot(file: File) -> None:
+        from der.view_states import figure_of_states
+        from der.view_style import save_figure
+
+        save_figure(figure_of_states(found), file)
+
+    drawn: Writers = {"plot": plot if len(found) else "there is no state"}
+    return {**drawn, **_shapes(found)}
+
+
+def _shapes(found: Path | States) -> Writers:
+    return {} if found.shapes is None else {"shapes": found.shapes.save}
