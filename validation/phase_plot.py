@@ -46,6 +46,7 @@ WORDS = {
     "h_over_t": "$h/t$",
 }
 LINE = 0.167  # of the legend, inches
+IN_A_ROW = 5  # of a legend below slices
 FINER = 4  # pixels between two nodes, at least,
 PIXELS = 512  # and at least so many across
 BETWEEN = 6  # pieces of a line between two points of a curve
@@ -92,24 +93,24 @@ def _slices(scan: Scan, curves: Sequence[Curve], beside: Sequence[Row]) -> canva
     cut = list(planes(family))
     columns = 3
     lines = math.ceil(len(cut) / columns)
-    wide, high = 10.2, 1.6 + (2.3 if len(family.sheets) == 2 else 2.15) * lines
+    legend = _legend(scan, curves, [m for m in family.marks if any(_at(family, m, k) for k in cut)])
+    foot = 0.66 + LINE * math.ceil(len(legend) / IN_A_ROW)
+    wide, high = 10.2, foot + 0.6 + (2.3 if len(family.sheets) == 2 else 2.15) * lines
     figure = canvas.page(wide, high)
     grid = figure.add_gridspec(
         lines,
         columns,
         left=0.5 / wide,
         right=1 - 0.15 / wide,
-        bottom=1.0 / high,
+        bottom=foot / high,
         top=1 - 0.72 / high,
         wspace=0.06,
         hspace=0.3 if len(family.sheets) == 2 else 0.2,
     )
-    shown: list[Case] = []
     for n, k in enumerate(cut):
         panel = figure.add_subplot(grid[n // columns, n % columns])
         here = [curve for curve in curves if _in_slice(family, curve, k)]
         marks = [case for case in family.marks if _at(family, case, k)]
-        shown += marks
         near = [row for row in beside if _at(family, row.case, k)]
         _fill(panel, scan, k, here, near, marks)
         _dress(panel, family, small=True)
@@ -123,7 +124,7 @@ def _slices(scan: Scan, curves: Sequence[Curve], beside: Sequence[Row]) -> canva
         if n + columns >= len(cut):
             panel.set_xlabel(WORDS[family.parameters[0]], fontsize=9.5, color=canvas.INK)
     _head(figure, family, 0.5 / wide, 1 - 0.2 / high)
-    _show_legend(figure, _legend(scan, curves, shown), 5)
+    _show_legend(figure, legend, IN_A_ROW)
     return figure
 
 
