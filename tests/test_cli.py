@@ -403,7 +403,7 @@ def test_numerics_are_those_asked_for(run):
 
 
 def test_defaults_are_those_of_the_contract(run):
-    """Design.md: 64 edges of the full ring, smallest sector, inextensible, nu 0.3, until pi."""
+    """The defaults: 64 edges of the full ring, smallest sector, inextensible, nu 0.3, until pi."""
     _, out, _ = run("fold", "circle", "--h-over-t", "4", "--json", "-")
     content = entries(out)
     numerics = content["numerics"]
@@ -487,7 +487,7 @@ def test_until_folded_goes_on_to_three_loops(run):
 
 
 def test_mode_is_judged_at_the_first_arrival_at_pi(run):
-    """Truth.md: h/t 1 is not foldable, though its path ends folded."""
+    """h/t 1 is not foldable, though its path ends folded."""
     words = ("fold", "circle", "--h-over-t", "1", "--edges", "32", "--until", "folded")
     content = entries(run(*words, "--json", "-")[1])
     assert content["mode"]["foldable"] is False

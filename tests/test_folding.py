@@ -275,7 +275,7 @@ def test_state_at_pi_is_the_one_of_the_arrays(name):
     [(4.0, (0, 0, 0)), (1.6, (0, 1, 2))],
 )
 def test_indices_of_the_folded_ring(h_over_t, indices):
-    """Truth.md: three loops of h/t 4 are stable even without grips; of 1.6 only in the grips."""
+    """Closed form: three loops of h/t 4 are stable even without grips; of 1.6 only in the grips."""
     at_pi = folded(h_over_t).at_pi
     assert (at_pi.index, at_pi.index_moment, at_pi.index_free) == indices
 
