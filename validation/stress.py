@@ -311,7 +311,7 @@ def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator
         turns = max(1, round(last / math.pi))
         dense = tuple(np.linspace(0.0, last, DENSE * turns + 1).tolist())
         wants = {name: getattr(scene, name) for name in _WANTS} | {"save_at": dense}
-        lost = work_lost(solver(Scene(scene.ring, scene.section, **wants)))
+        lost = work_lost(solver(Scene(scene.ring, scene.section, **wants)), asked=True)
     if lost > LOOSE and path.status == "done":
         yield "energy is not work", f"U and the integral of 4 M dgamma differ by {lost:.2g} of U"
 

@@ -145,12 +145,17 @@ def _errors(path: Path) -> Iterator[Fault]:
 # --- Energy is work --------------------------------------------------------------------------
 
 
-def work_lost(path: Path) -> float:
-    """Largest part of U that the work 4 M dgamma does not account for, snaps left out."""
-    snaps = [point.position for point in path.points if point.kind == "snap"]
+def work_lost(path: Path, *, asked: bool = False) -> float:
+    """Largest part of U that the work 4 M dgamma does not account for, snaps left out.
+
+    With ``asked``, only up to where gamma turns negative: no states can be asked for there.
+    """
+    negative = np.flatnonzero(path.gamma < 0.0)
+    end = int(negative[0]) if asked and len(negative) else len(path)
+    snaps = [p.position for p in path.points if p.kind == "snap" and p.position < end]
     scale = float(np.abs(path.energy).max())
     worst = 0.0
-    for low, high in pairwise([0, *snaps, len(path)]):
+    for low, high in pairwise([0, *snaps, end]):
         part = _part(path, low, high)
         if len(part) < FEWEST or not np.abs(part.moment).max() > 0.0 or np.ptp(part.gamma) < SAME:
             continue
