@@ -59,6 +59,15 @@ def test_every_state_has_its_errors(ring):
     assert "collocation" in record.error["how"]
 
 
+def test_a_stiff_ring_keeps_its_first_errors_small():
+    """Extended by 0.02 rad its first slope is far above any moment that it ever has."""
+    ring = der.triangle(math.radians(130.8), 0.005)
+    tolerance = 2e-6
+    found = solve(der.Scene(ring, der.rectangular_section(53.0, nu=0.5)), tolerance=tolerance)
+    assert 0.02 * found.moment[1] / found.gamma[1] > 5.0 * found.moment.max()
+    assert max(found.error["moment"]) < tolerance * np.abs(found.moment).max()
+
+
 def test_record_comes_back_from_json():
     """Bit for bit, masked indices included."""
     record = path(der.circle(), 1.6)

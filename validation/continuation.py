@@ -20,7 +20,7 @@ from validation.collocation import Collocation, Direction, Error, Failure, Solut
 from validation.meshes import Mesh, fitted
 
 FIRST_STEP = 0.05
-FIRST_TURN = 0.02  # rad
+FIRST_TURN, LEAST_TURN = 0.02, 2e-4  # rad
 LARGEST_STEP = 0.6
 SMALLEST_STEP = 1e-8
 ANGLE = 0.15  # rad, aimed at between tangents of neighbouring states
@@ -67,11 +67,11 @@ class Wanted:
 
 
 class Scales:
-    """The largest |M| and U met so far, at least those of a first small turn."""
+    """The largest |M| and U met so far, at least those of a first small turn from the flat ring."""
 
-    def __init__(self, start: Solution) -> None:
-        self.moment = FIRST_TURN * abs(start.slope)
-        self.energy = 2.0 * FIRST_TURN**2 * abs(start.slope)
+    def __init__(self, start: Solution, turn: float = FIRST_TURN) -> None:
+        self.moment = turn * abs(start.slope)
+        self.energy = 2.0 * turn**2 * abs(start.slope)
 
     def largest(self, at: Solution, error: Error) -> float:
         """The largest of the three errors, relative."""
@@ -185,7 +185,7 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
     """
     here, error, n = _flat(system, wanted)
     tally.newton_iterations += here.iterations
-    scales = Scales(here)
+    scales = Scales(here, LEAST_TURN)  # a stiff ring's moment is largest long before FIRST_TURN
     yield Visit(here, error)
     bend: Direction | None = None  # rate of change of the tangent over the last step
     length, age = FIRST_STEP, 0
