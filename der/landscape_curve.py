@@ -33,6 +33,7 @@ from der.unfolding import shapes
 
 FARTHEST = 2.0 * math.pi  # rad; a path that gets there unfolded, or to its negative, does not fold
 _MOST_STEPS = 600  # rings that fold do so in less than 150
+STOPPED = "stopped by the user"
 _NO_WELL = "the folded ring is no well: it opens by itself when its grips turn freely"
 _KINDS = ("fold", "limit", "branch")
 
@@ -67,27 +68,31 @@ def landscape(
     )
     tally, started = Tally(), time.perf_counter()
     visits, status, message = _followed(piece, wanted, tally, progress)
-    exact = replace(wanted, stability=True)  # rests are few: their index is always wanted
-    try:
-        visits, at = with_rests(piece, exact, visits, tally)
-    except Stuck as stuck:
-        at, status, message = [], "not converged", str(stuck)
-    whole = scene_sector(scene, "full") if index_free else None
-    for k in at:
-        if visits[k].index is None:
-            visits[k] = visit(piece, exact, visits[k].at, kind=visits[k].kind)
-    rests = tuple(rest_of(piece, whole, visits[k], k) for k in at)
-    folded = bool(visits) and status == "done" and three_covered(piece, visits[-1].at)
-    timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
-    path = _path(scene, piece, visits, timing, status, message)
-    found = Landscape(path, rests, folded, barriers(rests, folded=folded, message=message))
-    if not scene.error_bars or not folded:
+    with interrupts_between_states() as pressed:
+        exact = replace(wanted, stability=True)  # rests are few: their index is always wanted
+        try:
+            visits, at = with_rests(piece, exact, visits, tally)
+        except Stuck as stuck:
+            at, status, message = [], "not converged", str(stuck)
+        whole = scene_sector(scene, "full") if index_free else None
+        for k in at:
+            if visits[k].index is None:
+                visits[k] = visit(piece, exact, visits[k].at, kind=visits[k].kind)
+        rests = tuple(rest_of(piece, whole, visits[k], k) for k in at)
+        folded = bool(visits) and status == "done" and three_covered(piece, visits[-1].at)
+        timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
+        path = _path(scene, piece, visits, timing, status, message)
+        found = Landscape(path, rests, folded, barriers(rests, folded=folded, message=message))
+        bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
+        extrapolates = scene.error_bars and folded
+        coarser = meshes(scene.n_edges, piece.name)[1:] if extrapolates else ()
+        coarse = [
+            landscape(replace(bare, n_edges=n), index_free=False) for n in coarser if not pressed
+        ]
+    if pressed:
+        return replace(found, path=replace(path, status="interrupted", message=STOPPED))
+    if not extrapolates:
         return found
-    bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
-    coarse = [
-        landscape(replace(bare, n_edges=n), index_free=False)
-        for n in meshes(scene.n_edges, piece.name)[1:]
-    ]
     return _without_mesh(found, extrapolated([_heights(one) for one in (found, *coarse)]))
 
 
@@ -175,7 +180,7 @@ def _followed(
                 if progress is not None:
                     progress(one.at.state.load)
                 if pressed:
-                    return visits, "interrupted", "stopped by the user"
+                    return visits, "interrupted", STOPPED
     except Stuck as stuck:
         return visits, "not converged", str(stuck)
     return visits, "done", ""

@@ -101,6 +101,24 @@ def test_ctrl_c_keeps_the_landscape_so_far():
     assert one.barriers.fold is None
 
 
+def test_interrupting_between_meshes_keeps_the_landscape(monkeypatch):
+    """Pressed while the rests are looked for: they are found, and coarser meshes are left out."""
+    from der import landscape_curve
+
+    look = landscape_curve.with_rests
+
+    def pressed(*given):
+        signal.raise_signal(signal.SIGINT)
+        return look(*given)
+
+    monkeypatch.setattr(landscape_curve, "with_rests", pressed)
+    bar = der.rectangular_section(h_over_t=4.0)
+    one = landscape(der.Scene(der.circle(), bar, n_edges=64, error_bars=True))
+    assert one.status == "interrupted"
+    assert one.barriers.open is not None
+    assert not one.extrapolated
+
+
 def test_json_of_barriers_has_null_for_nan():
     """NaN is not JSON."""
     curves = barriers_over(der.circle(), [3.0, 8.0], n_edges=32)
