@@ -88,7 +88,9 @@ def _figure(found: Any) -> Any:
     if isinstance(found, Landscape):
         return view.figure_of_landscape(found)
     if isinstance(found, Surface):
-        return view.figure_of_surface(found)
+        from der.view_surface import figure_of_surface
+
+        return figure_of_surface(found)
     if isinstance(found, LeastPush):
         from der.view_push import figure_of_push
 

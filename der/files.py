@@ -1,22 +1,81 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and the records that are kept in them as JSON."""
 
+from __future__ import annotations
+
+import json
 import os
 import pathlib
 import secrets
-from collections.abc import Callable
-from typing import BinaryIO, TypeAlias
+from collections.abc import Callable, Mapping
+from typing import Any, BinaryIO, Self, TypeAlias
 
 FilePath: TypeAlias = str | os.PathLike[str]
 
 
-def decoded(content: bytes) -> str:
-    """Text of a file's content.
+class Saved:
+    """A record that writes itself as JSON."""
 
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
+    def to_json(self) -> str:
+        """JSON text."""
+        raise NotImplementedError
+
+    def save(self, path: FilePath) -> None:
+        """Write JSON, whole or not at all.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written; one already there is then unharmed.
+        """
+        content = self.to_json().encode()
+        write_whole(path, lambda file: file.write(content))
+
+
+class Kept(Saved):
+    """A record that also reads itself again."""
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Record of a JSON text; ValueError, with the place, if there is none in it."""
+        raise NotImplementedError
+
+    @classmethod
+    def load(cls, path: FilePath) -> Self:
+        """Record of a JSON file.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If it is broken or of another kind or schema; the message names the file and what is
+            wrong.
+        """
+        content = pathlib.Path(path).read_bytes()
+        try:
+            return cls.from_json(_decoded(content))
+        except ValueError as problem:
+            raise ValueError(f"{os.fspath(path)}: {problem}") from problem
+
+
+def json_lines(entries: Mapping[str, object]) -> str:
+    """JSON text of a record, one entry a line; NaN and infinities are refused."""
+    lines = [f'"{name}": {json.dumps(entry, allow_nan=False)}' for name, entry in entries.items()]
+    return "{\n  " + ",\n  ".join(lines) + "\n}\n"
+
+
+def json_entries(text: str) -> dict[str, Any]:
+    """Entries of a record by its JSON text; ValueError if it is not JSON, or no record."""
+    try:
+        entries = json.loads(text)
+    except (ValueError, RecursionError) as problem:
+        raise ValueError(f"not JSON: {problem}") from problem
+    if not isinstance(entries, dict):
+        raise ValueError(f"not a record but a JSON {type(entries).__name__}")
+    return entries
+
+
+def _decoded(content: bytes) -> str:
     try:
         return content.decode()
     except UnicodeDecodeError:

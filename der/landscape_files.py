@@ -6,9 +6,6 @@ entry, so that a damaged file is refused in one line that says where.
 
 from __future__ import annotations
 
-import json
-import os
-import pathlib
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -16,13 +13,13 @@ import numpy as np
 
 from der import checks
 from der.checks import Array, optional
-from der.files import FilePath, decoded, write_whole
+from der.files import Kept, json_entries, json_lines
 
 SCHEMA = 1
 T = TypeVar("T")
 
 
-class OnDisk:
+class OnDisk(Kept):
     """A record that writes itself as JSON, one entry a line, and reads itself again."""
 
     KIND: ClassVar[str]  # the first entry: what it is a record of
@@ -38,9 +35,7 @@ class OnDisk:
 
     def to_json(self) -> str:
         """JSON text of schema 1."""
-        entries = {"kind": self.KIND, "schema": SCHEMA, **self.entries()}
-        lines = [f'"{name}": {json.dumps(entries[name], allow_nan=False)}' for name in entries]
-        return "{\n  " + ",\n  ".join(lines) + "\n}\n"
+        return json_lines({"kind": self.KIND, "schema": SCHEMA, **self.entries()})
 
     @classmethod
     def from_json(cls, text: str) -> Self:
@@ -52,12 +47,7 @@ class OnDisk:
             If it is not JSON, of another kind or schema, or not such a record; the message says
             where.
         """
-        try:
-            given = json.loads(text)
-        except (ValueError, RecursionError) as problem:
-            raise ValueError(f"not JSON: {problem}") from problem
-        if not isinstance(given, dict):
-            raise ValueError(f"not a record but a JSON {type(given).__name__}")
+        given = json_entries(text)
         if "kind" not in given:
             raise ValueError(f"not a record of {cls.KIND}")
         if (kind := given.pop("kind")) != cls.KIND:
@@ -68,35 +58,6 @@ class OnDisk:
         record = cls.of_entries(entries)
         entries.end()
         return record
-
-    def save(self, path: FilePath) -> None:
-        """Write JSON, whole or not at all.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written; one already there is then unharmed.
-        """
-        content = self.to_json().encode()
-        write_whole(path, lambda file: file.write(content))
-
-    @classmethod
-    def load(cls, path: FilePath) -> Self:
-        """Record of a JSON file.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be read.
-        ValueError
-            If it is broken or of another kind or schema; the message names the file and what is
-            wrong.
-        """
-        content = pathlib.Path(path).read_bytes()
-        try:
-            return cls.from_json(decoded(content))
-        except ValueError as problem:
-            raise ValueError(f"{os.fspath(path)}: {problem}") from problem
 
 
 class Entries:

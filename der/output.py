@@ -86,7 +86,7 @@ def targets(
         if shapes:
             files["shapes"] = [folder / "shapes.npz"]
     if plot is not None:
-        from der.view_plots import FORMATS
+        from der.view_style import FORMATS
 
         if File(plot).suffix not in FORMATS:
             raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")

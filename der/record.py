@@ -7,18 +7,15 @@ where it enters, by name. Angles in radians, moments in GJ/a, energies of the fu
 
 from __future__ import annotations
 
-import json
-import os
-import pathlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from der import checks
 from der.checks import Array, Counts, optional
-from der.files import FilePath, decoded, write_whole
+from der.files import Kept, json_entries, json_lines
 from der.shapes import Shapes
 
 SCHEMA = 1
@@ -107,7 +104,7 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Path(Kept):
     """A path of equilibria, the answer of either solver; compare two by their `to_json`.
 
     Mappings are of JSON's types: str keys; str, bool, int, float, None, lists, mappings.
@@ -205,11 +202,10 @@ class Path:
         if self.raw is not None:
             entries["raw"] = self.raw
         entries["timing"] = vars(self.timing)
-        lines = [f'"{name}": {json.dumps(entries[name], allow_nan=False)}' for name in entries]
-        return "{\n  " + ",\n  ".join(lines) + "\n}\n"
+        return json_lines(entries)
 
     @classmethod
-    def from_json(cls, text: str) -> Path:
+    def from_json(cls, text: str) -> Self:
         """Path of a JSON text.
 
         Raises
@@ -217,12 +213,7 @@ class Path:
         ValueError
             If it is not JSON, of another schema, or not such a record; the message says where.
         """
-        try:
-            entries = json.loads(text)
-        except (ValueError, RecursionError) as problem:
-            raise ValueError(f"not JSON: {problem}") from problem
-        if not isinstance(entries, dict):
-            raise ValueError(f"not a record but a JSON {type(entries).__name__}")
+        entries = json_entries(text)
         if "kind" in entries:  # of landscapes and states
             raise ValueError(f"not a path but a record of kind {checks.shown(entries['kind'])}")
         if (schema := entries.pop("schema", None)) != SCHEMA:
@@ -237,36 +228,8 @@ class Path:
         entries["timing"] = built(Timing, "timing", entries.get("timing"))
         if "shapes" in entries:
             raise ValueError("shapes have no place in the JSON")
-        path: Path = built(cls, "record", entries)
+        path: Self = built(cls, "record", entries)
         return path
-
-    def save(self, path: FilePath) -> None:
-        """Write JSON, whole or not at all; shapes are saved by themselves.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written; one already there is then unharmed.
-        """
-        content = self.to_json().encode()
-        write_whole(path, lambda file: file.write(content))
-
-    @classmethod
-    def load(cls, path: FilePath) -> Path:
-        """Path of a JSON file.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be read.
-        ValueError
-            If it is broken or of another schema; the message names the file and what is wrong.
-        """
-        content = pathlib.Path(path).read_bytes()
-        try:
-            return cls.from_json(decoded(content))
-        except ValueError as problem:
-            raise ValueError(f"{os.fspath(path)}: {problem}") from problem
 
 
 def folding_mode(

@@ -33,6 +33,7 @@ from der.film import Playback, grips
 from der.projection import HALF_WIDTH, flat, seen
 from der.record import Path
 from der.tween import in_step
+from der.view_style import DASHES, INK, QUIET, STABLE, UNSTABLE
 
 FORMATS = (".gif", ".mp4")
 SIZE, DPI = (8.0, 4.5), 100  # inches; 800 x 450 px
@@ -40,11 +41,10 @@ CODEC = "libx264"  # of an MP4
 FPS = 15
 FRAMES = 105  # and what special points add: seven seconds
 REST = 0.8  # seconds that the first and the last picture stay
-INK, QUIET, PALE = "#222222", "#8a8a8a", "#d9d9d9"
-STABLE, UNSTABLE, FALLING = "#0072B2", "#D55E00", "#8a8a8a"  # Okabe and Ito
+PALE, FALLING = "#d9d9d9", QUIET
 STRETCHES: dict[bool | str | None, tuple[str, str, Any]] = {
     True: ("stable", STABLE, "-"),
-    False: ("unstable", UNSTABLE, (0, (3.5, 1.6))),
+    False: ("unstable", UNSTABLE, DASHES),
     None: ("equilibria", STABLE, "-"),
     SNAP: ("the ring snaps", FALLING, (0, (1.2, 1.4))),
 }

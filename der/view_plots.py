@@ -6,36 +6,45 @@ Figures are objects of their own, so that nothing global changes and no display 
 from __future__ import annotations
 
 import math
-from pathlib import Path as File
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from der.checks import Array
 from der.curve import SNAP, sides, smooth, stretches
-from der.files import FilePath, write_whole
+from der.files import FilePath
 from der.projection import HALF_WIDTH, seen
 from der.record import Mode, Path
 from der.shapes import Shapes
+from der.view_style import (
+    BAR,
+    DASHES,
+    DPI,
+    INK,
+    QUIET,
+    STABLE,
+    TITLE,
+    UNSTABLE,
+    blank,
+    dress,
+    mark,
+    of_ring,
+    save_figure,
+)
 
-Array: TypeAlias = NDArray[np.float64]
-
-FORMATS = (".png", ".pdf", ".svg")
-SIZE, DPI = (8.0, 6.0), 150  # inches; 1200 x 900 px
-INK, QUIET = "#222222", "#8a8a8a"
-# line style of a stretch by whether it is stable; blue and vermilion of Okabe and Ito
+SIZE = (8.0, 6.0)  # inches; 1200 x 900 px
+# line style of a stretch by whether it is stable
 STRETCHES: dict[bool | str | None, tuple[str, str, Any]] = {
-    True: ("stable ($\\gamma$ held)", "#0072B2", "-"),
-    False: ("unstable ($\\gamma$ held)", "#D55E00", (0, (3.5, 1.6))),
-    None: ("equilibria (stability not computed)", "#0072B2", "-"),
-    SNAP: ("the ring snaps", "#8a8a8a", (0, (1.2, 1.4))),
+    True: ("stable ($\\gamma$ held)", STABLE, "-"),
+    False: ("unstable ($\\gamma$ held)", UNSTABLE, DASHES),
+    None: ("equilibria (stability not computed)", STABLE, "-"),
+    SNAP: ("the ring snaps", QUIET, (0, (1.2, 1.4))),
 }
 STATE: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.2, "color": INK}
 MANY = 250  # states; more would hide the line that they lie on
@@ -47,7 +56,6 @@ MARKS = {  # label, marker, size
     "contact": ("self-crossing", "x", 4.6),
 }
 
-UNITS = {"vertex_angle": "°"}  # of a ring's parameters
 LETTERS = "ABCDEF"  # one for each snapshot
 CAPTION = 0.82  # room for what stands below a ribbon, of the row's height
 
@@ -67,9 +75,8 @@ def figure_of_path(path: Path) -> Figure:
     """
     if not len(path):
         raise ValueError("path must have at least one state to be plotted, got none")
-    figure = Figure(figsize=SIZE, dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    figure.text(0.5, 0.972, _title(path), ha="center", va="center", fontsize=9.5, color=INK)
+    figure = blank(SIZE)
+    figure.text(0.5, 0.972, _title(path), **TITLE)
     top = 0.94 if path.shapes is None else 0.665
     grid = figure.add_gridspec(
         2, 1, left=0.085, right=0.985, bottom=0.125, top=top, height_ratios=(1.45, 1), hspace=0.07
@@ -110,17 +117,9 @@ def save_plot(path: Path, file: FilePath) -> None:
     Raises
     ------
     ValueError
-        If the suffix is not one of FORMATS, the place cannot be written to, or there is no state.
+        If the suffix is no picture's, the place cannot be written to, or there is no state.
     """
-    suffix = File(file).suffix.lower()
-    if suffix not in FORMATS:
-        raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
-    figure = figure_of_path(path)
-    try:
-        write_whole(file, lambda opened: figure.savefig(opened, format=suffix[1:]))
-    except OSError as problem:
-        reason = problem.strerror or problem
-        raise ValueError(f"plot {str(file)!r} cannot be written: {reason}") from problem
+    save_figure(figure_of_path(path), file)
 
 
 # --- Words -----------------------------------------------------------------------------------
@@ -128,13 +127,6 @@ def save_plot(path: Path, file: FilePath) -> None:
 
 def _title(path: Path) -> str:
     """Ring, section, mesh and mode in one line."""
-    ring = [
-        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}{UNITS.get(name, '')}"
-        for name, value in path.ring.items()
-        if isinstance(value, float) and (name, value) != ("natural_curvature", 1.0)
-    ]
-    if path.ring.get("twist_axis") == "y":
-        ring.append("about y")
     section = path.section
     if section.get("h_over_t") is None:
         bar = rf"$\alpha$ = {section['alpha']:.4g}, $\beta$ = {section['beta']:.4g}"
@@ -142,14 +134,14 @@ def _title(path: Path) -> str:
         bar = rf"h/t = {section['h_over_t']:g}, $\nu$ = {section['nu']:g}"
     edges = path.numerics.get("n_edges")
     parts = [
-        ", ".join([str(path.ring["shape"]), *ring]),
+        of_ring(path.ring),
         bar,
         "boundary-value problem" if edges is None else f"{edges} edges",
         _words(path.mode) if path.mode else _reach(path),
     ]
     if path.status != "done":
         parts.append(path.status)
-    return "   |   ".join(parts)
+    return BAR.join(parts)
 
 
 def _times_pi(angle: float) -> str:
@@ -185,21 +177,10 @@ def _legend_handles(path: Path) -> list[Line2D]:
     kinds = {point.kind for point in path.points}
     for kind, (label, marker, size) in MARKS.items():
         if kind in kinds:
-            handles.append(Line2D([], [], label=label, **_mark(marker, size)))
+            handles.append(Line2D([], [], label=label, **mark(marker, size)))
     if len(path) <= MANY:
         handles.append(Line2D([], [], label="computed state", **STATE))
     return handles
-
-
-def _mark(marker: str, size: float) -> dict[str, Any]:
-    return {
-        "linestyle": "none",
-        "marker": marker,
-        "markersize": size,
-        "markerfacecolor": "white",
-        "markeredgecolor": INK,
-        "markeredgewidth": 0.9,
-    }
 
 
 # --- Curves ----------------------------------------------------------------------------------
@@ -214,12 +195,9 @@ def _draw_curve(panel: Axes, path: Path, height: Array, label: str) -> None:
         panel.plot(path.gamma / math.pi, height, zorder=3, **STATE)
     for kind, (_, marker, size) in MARKS.items():
         at = [point.position for point in path.points if point.kind == kind]
-        panel.plot(path.gamma[at] / math.pi, height[at], zorder=4, **_mark(marker, size))
-    panel.set_ylabel(label, fontsize=9, color=INK)
+        panel.plot(path.gamma[at] / math.pi, height[at], zorder=4, **mark(marker, size))
+    dress(panel, label)
     panel.margins(x=0.03, y=0.12)
-    panel.tick_params(labelsize=8, color=QUIET, labelcolor=INK, direction="in")
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.spines[["left", "bottom"]].set_color(QUIET)
     panel.yaxis.set_label_coords(-0.062, 0.5)
 
 

@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from der.checks import Array
 from der.landscape_push_record import ALIKE, KINDS, LeastPush, Push
 from der.view_style import (
+    DASHES,
     FREE,
     INK,
     STABLE,
@@ -24,6 +25,7 @@ from der.view_style import (
     blank,
     dress,
     legend_below,
+    mark,
     seen,
     sure,
     title,
@@ -49,7 +51,6 @@ EVENTS = {
     "end": "end of the march",
 }
 MARKS = {"pass": "^", "fold": "D", "branch": "s", "limit": "v", "end": "X"}
-DASHES = (0, (3.5, 1.6))  # of a push whose dead load is the best
 ARROW = 0.15  # length of an arrow
 WIDE, HIGH = 1.0, 0.5  # of a little picture, in its own units
 
@@ -257,14 +258,7 @@ def _line(push: Push) -> tuple[Array, Array]:
 
 def _mark(event: str) -> dict[str, Any]:
     """How an event is marked."""
-    return {
-        "linestyle": "none",
-        "marker": MARKS[event],
-        "markersize": 5.2 if event in ("fold", "branch") else 6.2,
-        "markerfacecolor": "white",
-        "markeredgecolor": INK,
-        "markeredgewidth": 0.9,
-    }
+    return mark(MARKS[event], 5.2 if event in ("fold", "branch") else 6.2)
 
 
 # --- Works -----------------------------------------------------------------------------------

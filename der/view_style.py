@@ -1,4 +1,4 @@
-"""What the pictures of landscapes share: colours, title, axes, and how a ring is seen."""
+"""What pictures of the engine's answers share: colours, title, axes, and how a ring is seen."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ FORMATS = (".png", ".pdf", ".svg")
 DPI = 150
 INK, QUIET = "#222222", "#8a8a8a"
 STABLE, UNSTABLE, FREE = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito
+DASHES = (0, (3.5, 1.6))  # of what is unstable
 UNITS = {"vertex_angle": "°"}
 BAR = "   |   "  # between the parts of a title
 ACROSS = 200  # points along a ring
@@ -83,6 +84,16 @@ def title(
 
 def about(ring: Mapping[str, object], section: Mapping[str, object]) -> list[str]:
     """Words for a ring and words for its section."""
+    parts = [of_ring(ring)]
+    if section.get("h_over_t") is not None:
+        parts.append(f"h/t = {section['h_over_t']:g}")
+    elif section:
+        parts.append(rf"$\alpha$ = {section['alpha']:.4g}, $\beta$ = {section['beta']:.4g}")
+    return parts
+
+
+def of_ring(ring: Mapping[str, object]) -> str:
+    """Words for a ring."""
     words = [str(ring["shape"])]
     words += [
         f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}{UNITS.get(name, '')}"
@@ -91,12 +102,7 @@ def about(ring: Mapping[str, object], section: Mapping[str, object]) -> list[str
     ]
     if ring.get("twist_axis") == "y":
         words.append("about y")
-    parts = [", ".join(words)]
-    if section.get("h_over_t") is not None:
-        parts.append(f"h/t = {section['h_over_t']:g}")
-    elif section:
-        parts.append(rf"$\alpha$ = {section['alpha']:.4g}, $\beta$ = {section['beta']:.4g}")
-    return parts
+    return ", ".join(words)
 
 
 def sure(value: float, error: float) -> str:
@@ -113,6 +119,18 @@ def dress(panel: Axes, label: str) -> None:
     panel.tick_params(labelsize=8, color=QUIET, labelcolor=INK, direction="in")
     panel.spines[["top", "right"]].set_visible(False)
     panel.spines[["left", "bottom"]].set_color(QUIET)
+
+
+def mark(marker: str, size: float, face: str = "white") -> dict[str, Any]:
+    """How a special state is drawn."""
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "markersize": size,
+        "markerfacecolor": face,
+        "markeredgecolor": INK,
+        "markeredgewidth": 0.9,
+    }
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], *, fontsize: float = 8.0) -> None:

@@ -23,9 +23,9 @@ from der.view_landscape import (
     figure_of_barriers,
     figure_of_landscape,
     figure_of_pass,
-    figure_of_surface,
 )
 from der.view_style import save_figure
+from der.view_surface import figure_of_surface
 
 
 def scene(h_over_t=4.0, ring=None, **numerics):

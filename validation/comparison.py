@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from der.files import FilePath, write_whole
+from der.files import Saved
 from der.record import Path, Point
 from der.scene import Scene
 from validation.continuation import Visit
@@ -67,7 +67,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Saved):
     """A rod's path and that of its boundary-value problem."""
 
     rod: Path
@@ -111,17 +111,6 @@ class Comparison:
             "within": None if math.isnan(self.within) else self.within,
         }
         return json.dumps(entries, allow_nan=False) + "\n"
-
-    def save(self, path: FilePath) -> None:
-        """Write JSON, whole or not at all.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written; one already there is then unharmed.
-        """
-        content = self.to_json().encode()
-        write_whole(path, lambda file: file.write(content))
 
 
 def compare(

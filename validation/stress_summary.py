@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from der.files import FilePath, write_whole
+from der.files import Saved
 from validation.stress_cases import Case
 
 
@@ -26,7 +26,7 @@ class Failure:
 
 
 @dataclass
-class Summary:
+class Summary(Saved):
     """What became of the cases."""
 
     level: str
@@ -45,17 +45,6 @@ class Summary:
         """JSON: numbers, reasons, and every failure with its case."""
         entries = asdict(self) | {"failed": [failure.to_json() for failure in self.failed]}
         return json.dumps(entries, indent=1, allow_nan=False) + "\n"
-
-    def save(self, file: FilePath) -> None:
-        """Write JSON, whole or not at all.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written.
-        """
-        content = self.to_json().encode()
-        write_whole(file, lambda target: target.write(content))
 
     def __str__(self) -> str:
         """A table of reasons, worst first."""
