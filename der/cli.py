@@ -491,7 +491,10 @@ def bench(
 @app.command()
 def stress(
     quick: Annotated[bool, typer.Option("--quick", help="120 cases, under a minute.")] = False,
-    long: Annotated[bool, typer.Option("--long", help="10,000 cases, about an hour.")] = False,
+    long: Annotated[bool, typer.Option("--long", help="10,000 cases, about half an hour.")] = False,
+    workers: Annotated[
+        int | None, typer.Option(parser=whole, help="Processes; with --long one a core, else one.")
+    ] = None,
     json: Annotated[str | None, typer.Option(metavar="F", help="Write the summary here.")] = None,
 ) -> None:
     """Try to break both solvers, and count what has no named reason."""
@@ -503,6 +506,10 @@ def stress(
             check_writable("json", File(json))
         from validation.stress import stress as run
 
-        summary = run("long" if long else "quick", None if json is None else File(json))
+        summary = run(
+            "long" if long else "quick",
+            None if json is None else File(json),
+            workers=workers if workers is not None or long else 1,
+        )
     show(str(summary))
     raise typer.Exit(130 if summary.interrupted else 0)

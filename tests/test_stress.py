@@ -91,6 +91,13 @@ def test_file_and_progress(tmp_path):
     assert str(found).startswith("3 cases in ")
 
 
+def test_workers_find_the_same(summary):
+    """Two processes, the same cases in the same order, the same failures."""
+    shared = silent(count=SOME, seed=3, workers=2)
+    assert (shared.cases, shared.by_kind) == (SOME, summary.by_kind)
+    assert [one.message for one in shared.failed] == [one.message for one in summary.failed]
+
+
 def test_interrupt_keeps_what_there_is(tmp_path, monkeypatch):
     """Ctrl-C in the third case: two are counted, and written."""
     done = []

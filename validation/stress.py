@@ -18,13 +18,13 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from types import FrameType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -46,6 +46,7 @@ from der.shapes import Shapes
 from der.snap import TO_AND_FRO
 from der.unfinished import NotConverged
 from validation import collocation
+from validation.jobs import Jobs
 from validation.random_rings import DENSE, LOOSE
 from validation.solving import solve
 from validation.stress_cases import Case, case_from_json, cases, ring_of, scene_of, section_of
@@ -60,8 +61,11 @@ from validation.stress_checks import (
 )
 from validation.stress_inputs import PERHAPS, arguments, refusal
 from validation.stress_summary import Failure, Summary
+from validation.workers import processes
+from validation.workers import workers as started
 
 LEVELS = {"quick": (120, 128), "long": (10_000, 2048)}  # number of cases, edges at most
+BATCH = 8  # cases that a worker gets at a time
 TIME_LIMIT = 120.0  # s of CPU time, of one case: what takes longer hangs
 SYMMETRIC = 1e-6  # a: a path that was followed on the full ring without leaving the symmetric one
 RETURNED = 1e-6  # a: a ring that has come back
@@ -102,6 +106,7 @@ def stress(
     *,
     seed: int = 0,
     count: int | None = None,
+    workers: int | None = 1,
     progress: Callable[[str], object] | None = None,
 ) -> Summary:
     """Try to break the solvers.
@@ -112,6 +117,7 @@ def stress(
     file : where the summary is written, now and then and at the end.
     seed : of the cases; those of a seed and level are always the same.
     count : of cases, if not the level's own.
+    workers : processes, None: one a core; 1: this one. The summary is the same but for times.
     progress : called with a line after every case; None: it is shown on a terminal.
 
     Returns
@@ -122,9 +128,11 @@ def stress(
     Raises
     ------
     ValueError
-        If there is no such level.
+        If there is no such level, or for a number of workers below 1.
     OSError
         If the file cannot be written.
+    RuntimeError
+        If workers cannot work.
     """
     if level not in LEVELS:
         raise ValueError(f"level must be one of {', '.join(LEVELS)}, got {level!r}")
@@ -132,14 +140,12 @@ def stress(
     number = number if count is None else count
     summary = Summary(level, seed)
     show = _shown if progress is None else progress
-    _load_kernels()
+    tried = cases(number, seed, most_edges=most_edges)
     started = saved = time.monotonic()
     try:
-        for case in cases(number, seed, most_edges=most_edges):
-            begun = time.monotonic()
-            found = list(repeat(case))
+        for case, found, seconds in _done(tried, processes(workers)):
             now = time.monotonic()
-            summary.add(case, found, now - begun)
+            summary.add(case, found, seconds)
             summary.seconds = now - started
             show(
                 f"{summary.cases} of {number} cases, {summary.failures} failures, "
@@ -155,6 +161,55 @@ def stress(
     if file is not None:
         summary.save(file)
     return summary
+
+
+_Done: TypeAlias = tuple[tuple[Failure, ...], float]  # what went wrong, and what it took [s]
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbered:
+    """A case by its place; no two are equal."""
+
+    place: int
+    case: Case
+
+
+def _done(tried: Iterable[Case], width: int) -> Iterator[tuple[Case, tuple[Failure, ...], float]]:
+    """Cases in their order, what went wrong with each, and what it took [s]."""
+    if width == 1:
+        for case in tried:
+            ((found, seconds),) = _repeated((_Numbered(0, case),))
+            yield case, found, seconds
+        return
+    things = [_Numbered(place, case) for place, case in enumerate(tried)]
+    batches = [tuple(things[k : k + BATCH]) for k in range(0, len(things), BATCH)]
+    ready: dict[int, _Done] = {}
+    told = 0
+    with started(width) as crew:
+        for batch, results in Jobs(crew, _repeated, batches).done():
+            for thing, result in zip(batch, results or map(_died, batch), strict=True):
+                ready[thing.place] = result
+            while told in ready:
+                yield things[told].case, *ready.pop(told)
+                told += 1
+
+
+def _repeated(batch: tuple[_Numbered, ...]) -> list[_Done]:
+    """What a worker does."""
+    _load_kernels()
+    results = []
+    for thing in batch:
+        begun = time.monotonic()
+        found = repeat(thing.case)
+        results.append((found, time.monotonic() - begun))
+    return results
+
+
+def _died(thing: _Numbered) -> _Done:
+    """Of a case that has ended its worker, time and again."""
+    text = "the process that worked on it died [unexpected]"
+    failure = Failure(thing.case, _reason("Died", text), text, explained=False, seconds=0.0)
+    return (failure,), 0.0
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -57,7 +58,7 @@ class Summary(Saved):
             lines.append(f"{count:6d}  {'UNEXPLAINED ' if reason in strange else ''}{reason}")
         return "\n".join(lines)
 
-    def add(self, case: Case, found: list[Failure], seconds: float) -> None:
+    def add(self, case: Case, found: Sequence[Failure], seconds: float) -> None:
         """Count a case and what went wrong with it."""
         self.cases += 1
         self.by_kind[case.kind] = self.by_kind.get(case.kind, 0) + 1

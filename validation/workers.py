@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
-from validation.figures.drawing import one_thread_each
+ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Workers(Protocol):
@@ -62,7 +62,7 @@ def workers(number: int | None = None, scheduler: str | None = None) -> Iterator
     """
     if scheduler is not None and number is not None:
         raise ValueError(f"workers cannot be given together with a scheduler, got {number!r}")
-    crew: Workers = Processes(_checked(number)) if scheduler is None else Cluster(scheduler)
+    crew: Workers = Processes(processes(number)) if scheduler is None else Cluster(scheduler)
     try:
         with one_thread_each():
             yield crew
@@ -148,8 +148,14 @@ class Cluster:
         self._client.close()
 
 
-def _checked(number: int | None) -> int:
-    """The number of workers; None: one for each core that this process may use."""
+def processes(number: int | None) -> int:
+    """The number of workers; None: one for each core that this process may use.
+
+    Raises
+    ------
+    ValueError
+        If it is below 1.
+    """
     if number is None:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
@@ -157,6 +163,21 @@ def _checked(number: int | None) -> int:
     if isinstance(number, bool) or not isinstance(number, int) or number < 1:
         raise ValueError(f"workers must be a whole number from 1, got {number!r}")
     return number
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Have processes that are started here compute on one thread."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _start() -> None:

@@ -8,13 +8,11 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path as File
 
 from der.files import FilePath
-
-ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+from validation.workers import one_thread_each, processes
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def draw(
     Interrupted
         At Ctrl-C; has what was finished until then.
     """
-    workers = _checked(workers)
+    workers = processes(workers)
     _make(folder)
     written: dict[str, list[File]] = {}
     failed: dict[str, str] = {}
@@ -87,17 +85,6 @@ def draw(
     return drawn
 
 
-def _checked(workers: int | None) -> int:
-    """The number of workers; None: one for each core that this process may use."""
-    if workers is None:
-        if hasattr(os, "sched_getaffinity"):
-            return len(os.sched_getaffinity(0))
-        return os.cpu_count() or 1
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
-    return workers
-
-
 def _make(folder: FilePath) -> None:
     """Make the folder unless it is there."""
     try:
@@ -107,21 +94,6 @@ def _make(folder: FilePath) -> None:
         raise ValueError(
             f"folder must be one that can be made, got {os.fspath(folder)!r}: {reason}"
         ) from problem
-
-
-@contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Have processes that are started here compute on one thread."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _ignore_ctrl_c() -> None:
