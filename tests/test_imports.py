@@ -38,8 +38,9 @@ ROOMS = {
         "landscape_surface_record",
         "landscape_push_record",
         "states_record",
+        "planar_record",
     ),
-    "kernels": ("frames", "strain", "dense", "block_ldl", "linking", "assembly"),
+    "kernels": ("frames", "strain", "dense", "block_ldl", "linking", "assembly", "planar_rod"),
     "engine": (
         "rod",
         "supports",
@@ -83,6 +84,11 @@ ROOMS = {
         "states_basins",
         "states_measures",
         "states_search",
+        "planar_march",
+        "planar_ring",
+        "planar_area",
+        "planar_states",
+        "planar_squeeze",
     ),
     "film": ("curve", "film", "captions", "ribbon", "panel", "projection", "tween"),
     "layout": (
@@ -102,8 +108,17 @@ ROOMS = {
         "view_html",
         "view_states",
         "view_push",
+        "view_planar",
     ),
-    "roof": ("output", "drawings", "landscape_words", "states_words", "cli", "__main__"),
+    "roof": (
+        "output",
+        "drawings",
+        "landscape_words",
+        "states_words",
+        "planar_words",
+        "cli",
+        "__main__",
+    ),
 }
 # What each room may import from besides itself.
 BELOW = {
@@ -320,6 +335,7 @@ def test_only_commands_import_validation_and_scenarios():
             {
                 "der/view_landscape.py",
                 "der/view_movie.py",
+                "der/view_planar.py",
                 "der/view_plots.py",
                 "der/view_push.py",
                 "der/view_states.py",
