@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from der.folding import fold
     from der.landscape_push import least_push
+    from der.planar_record import PlanarState, PlanarStates, Squeeze, SqueezePoint
+    from der.planar_squeeze import squeeze
+    from der.planar_states import planar
     from der.record import Path, Point
     from der.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.scene import Scene
@@ -25,6 +28,8 @@ __all__ = [
     "Interrupted",
     "NotConverged",
     "Path",
+    "PlanarState",
+    "PlanarStates",
     "Point",
     "Ring",
     "RingState",
@@ -32,16 +37,20 @@ __all__ = [
     "Scene",
     "Section",
     "Shapes",
+    "Squeeze",
+    "SqueezePoint",
     "States",
     "Transition",
     "circle",
     "ellipse",
     "fold",
     "least_push",
+    "planar",
     "profile",
     "rectangle",
     "rectangular_section",
     "section",
+    "squeeze",
     "states",
     "triangle",
 ]
@@ -49,6 +58,9 @@ __all__ = [
 _HOME = {
     "folding": ("fold",),
     "landscape_push": ("least_push",),
+    "planar_record": ("PlanarState", "PlanarStates", "Squeeze", "SqueezePoint"),
+    "planar_squeeze": ("squeeze",),
+    "planar_states": ("planar",),
     "record": ("Path", "Point"),
     "ring": ("Ring", "circle", "ellipse", "profile", "rectangle", "triangle"),
     "scene": ("Scene",),

@@ -29,7 +29,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from der.dense import invert, invert_three, solve_dense
+from der.dense import invert, invert_one, invert_three, solve_dense
 
 MAX_DELAYED = 8
 
@@ -125,6 +125,9 @@ def factor(diag, off, border):
         if b == 3:  # a constant, so that loops are unrolled
             _reduce(3, j, diag, off, inverse, unit, lower, pivot)
             minus = invert_three(pivot, _DELAY_BELOW)
+        elif b == 1:  # likewise: a rod in a plane
+            _reduce(1, j, diag, off, inverse, unit, lower, pivot)
+            minus = invert_one(pivot, _DELAY_BELOW)
         else:
             _reduce(b, j, diag, off, inverse, unit, lower, pivot)
             minus = -1
@@ -177,6 +180,8 @@ def solve_band(inverse, lower, x):
     b = x.shape[1]
     if b == 3:  # a constant, so that loops are unrolled
         _sweep(3, inverse, lower, x)
+    elif b == 1:
+        _sweep(1, inverse, lower, x)
     else:
         _sweep(b, inverse, lower, x)
 

@@ -388,6 +388,61 @@ def states(ring: RingOptions, wanted: StatesOptions) -> int:
     )
 
 
+@dataclass(frozen=True)
+class PlanarOptions:
+    """What is sought in the plane, and what is written."""
+
+    distance: Annotated[
+        float | None,
+        number_option("Squeeze or pull the flat ring until the points of its axis are so far, a."),
+    ] = None
+    turns: Annotated[
+        int | None, typer.Option(parser=whole, help="Cover circles up to so many times.")
+    ] = None
+    edges: Annotated[int, typer.Option(parser=whole, help="Edges of the full ring.")] = 256
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write it here ('-': output).")] = (
+        None
+    )
+    plot: Annotated[str | None, typer.Option(metavar="F", help="Draw it: .png, .pdf, .svg.")] = None
+    out: Annotated[
+        str | None, typer.Option(metavar="DIR", help="Write planar.json, .png and shapes.npz here.")
+    ] = None
+    quiet: Annotated[bool, typer.Option("--quiet", help="No summary.")] = False
+
+
+@command(app, RingOptions, PlanarOptions)
+def planar(ring: RingOptions, wanted: PlanarOptions) -> int:
+    """Find the states of a ring in its plane, with its packing ratio; or squeeze it there."""
+    from der.scene import Scene
+
+    with options_named():
+        if wanted.distance is not None and wanted.turns is not None:
+            raise ValueError(f"turns cannot be given together with --distance, got {wanted.turns}")
+        scene = Scene(ring.ring(), ring.section(), n_edges=wanted.edges, error_bars=True)
+        written = targets(wanted.json, wanted.plot, None, wanted.out, stem="planar")
+        found: Any
+        if wanted.distance is None:
+            from der.planar_states import planar as search
+
+            found = search(scene, turns=wanted.turns)
+        else:
+            from der.planar_squeeze import squeeze
+
+            found = squeeze(scene, wanted.distance)
+    from der.drawings import of_planar
+    from der.planar_words import words
+
+    return hand_over(
+        found,
+        written,
+        {"done": 0, "interrupted": 130}.get(found.status, 3),
+        of_planar(found),
+        lambda: words(found),
+        unfinished=f"{found.message}; states that were found: {len(found)},",
+        quiet=wanted.quiet,
+    )
+
+
 PHASES = {  # the diagrams of each shape, that of a cube last
     "ellipse": ("fig3a",),
     "rectangle": ("fig5b", "fig5c", "fig5a"),

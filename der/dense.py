@@ -89,6 +89,16 @@ def invert(A, delay_below, out_delayed):
 
 
 @njit(cache=True)
+def invert_one(A, smallest):
+    """`invert` of a single entry (1, 1) above ``smallest``; else -1, with ``A`` as it was."""
+    a = A[0, 0]
+    if not abs(a) > smallest:
+        return -1
+    A[0, 0] = -1.0 / a
+    return int(a < 0.0)
+
+
+@njit(cache=True)
 def invert_three(A, smallest):
     """`invert` of a matrix (3, 3) by formula, with its pivots in order, where they allow that.
 

@@ -14,6 +14,7 @@ from der.output import DRAWN
 if TYPE_CHECKING:
     from der.landscape_record import Landscape
     from der.output import Writers
+    from der.planar_record import PlanarStates, Squeeze
     from der.record import Path
     from der.states_record import States
 
@@ -111,5 +112,18 @@ def of_states(found: States) -> Writers:
     return {**drawn, **_shapes(found)}
 
 
-def _shapes(found: Path | States) -> Writers:
+def of_planar(found: PlanarStates | Squeeze) -> Writers:
+    """Of the states of a ring in its plane, or of how it is squeezed there."""
+
+    def plot(file: File) -> None:
+        from der.view_planar import figure_of_planar
+        from der.view_style import save_figure
+
+        save_figure(figure_of_planar(found), file)
+
+    drawn: Writers = {"plot": plot if len(found) else "there is no state"}
+    return {**drawn, **_shapes(found)}
+
+
+def _shapes(found: Path | States | PlanarStates | Squeeze) -> Writers:
     return {} if found.shapes is None else {"shapes": found.shapes.save}

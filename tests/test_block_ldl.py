@@ -25,7 +25,13 @@ Matrix = tuple[np.ndarray, np.ndarray, np.ndarray]  # diag (n, b, b), off (n, b,
 
 SIZES = pytest.mark.parametrize(
     ("n", "b", "m"),
-    [(n, b, m) for n in (1, 2, 3, 5, 8, 12) for b in (3, 4) for m in (0, 1, 2, 3, 5) if m <= n * b],
+    [
+        (n, b, m)
+        for n in (1, 2, 3, 5, 8, 12)
+        for b in (1, 3, 4)
+        for m in (0, 1, 2, 3, 5)
+        if m <= n * b
+    ],
 )
 
 

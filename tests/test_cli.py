@@ -93,6 +93,7 @@ def line(*words, without=()):
     return ("fold", "circle", *good, *words)
 
 
+PLANAR = ("planar", "circle", "--h-over-t", "4")
 WRONG = [
     # words, and what the line must hold: option, value, what is allowed
     (line("--h-over-t", "0"), "--h-over-t", "0.0", "finite number > 0"),
@@ -207,6 +208,11 @@ WRONG = [
     (line("--html", "x.html", "--beside", "--quiet"), "--beside", "'--quiet'", "a file name"),
     (("states", *line()[1:], "--json", "--quiet"), "--json", "'--quiet'", "a file name"),
     (("states", *line()[1:], "--edges", "66"), "--edges", "66", "divisible by 4, as the path"),
+    (("planar", "circle"), "--h-over-t", "got neither", "must be given"),
+    ((*PLANAR, "--distance", "3.2"), "--distance", "3.2", "3.14159 (the ring drawn"),
+    ((*PLANAR, "--edges", "40"), "--edges", "40", "divisible by 16"),
+    ((*PLANAR, "--turns", "99"), "--turns", "99", "from 1 to 12 on 256 edges"),
+    ((*PLANAR, "--turns", "2", "--distance", "1"), "--turns", "2", "--distance"),
     (("phase", "square", "--out", "d"), "SHAPE", "'square'", "ellipse"),
     (("phase", "ellipse", "--out", "d", "--check", "rod"), "--check", "'rod'", "'der'"),
     (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
@@ -786,6 +792,31 @@ def test_states_say_why_none_was_found(run):
     code, _, err = run(*words)
     assert code == 3
     assert "no state was found from any start; the flat ring is no equilibrium: " in err[0]
+
+
+def test_planar_states_fill_their_folder(run):
+    """A table with error bars, the record, a picture and shapes."""
+    words = ("planar", "ellipse", "--b-over-a", "0.5", "--h-over-t", "4", "--edges", "64")
+    code, out, err = run(*words, "--out", "d")
+    assert (code, err) == (0, [])
+    assert "folded: packing ratio 0.294424" in out
+    assert {f.name for f in File("d").iterdir()} == {"planar.json", "planar.png", "shapes.npz"}
+    assert File("d/planar.png").read_bytes().startswith(b"\x89PNG")
+    assert entries(File("d/planar.json").read_text())["kind"] == "planar"
+
+
+def test_a_ring_is_squeezed_in_its_plane(run):
+    """To where its points touch, drawn; and one that is lost on the way says how far it got."""
+    code, out, err = run(*PLANAR, "--edges", "64", "--distance", "0", "--plot", "p.png")
+    assert (code, err) == (0, [])
+    assert "squeezed in its plane" in out
+    assert "  0.00000000    -6.19" in out
+    assert File("p.png").read_bytes().startswith(b"\x89PNG")
+    code, _, err = run(*PLANAR, "--edges", "32", "--distance", "3.14159", "--quiet")
+    assert code == 3
+    assert "use more edges at " in err[0]
+    assert "der-unfinished.json" in err[0]
+    assert entries(File("der-unfinished.json").read_text())["status"] == "not converged"
 
 
 @pytest.mark.parametrize("more", [(), ("--plot", "p.png")])

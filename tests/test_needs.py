@@ -10,6 +10,8 @@ import pytest
 
 import der
 from der.assembly import assemble
+from der.planar_ring import covered, planar_ring
+from der.planar_rod import assemble_planar
 from der.relaxation import relax
 from der.sector import sector
 from validation.bench_rows import peak_memory
@@ -150,3 +152,41 @@ def test_what_is_not_asked_for_is_not_imported(wants):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert set(json.loads(done.stdout)) == NEEDED[wants]
+
+
+SPATIAL = ("der.frames", "der.strain", "der.assembly", "der.equilibrium", "der.rod", "der.sector")
+
+
+@pytest.mark.parametrize(
+    ("work", "area"),
+    [("der.planar(scene)", True), ("der.squeeze(scene, 1.0)", False)],
+)
+def test_a_planar_scene_knows_nothing_of_space(work, area):
+    """It loads no kernel of the rod in space, and shapely only for a packing ratio."""
+    code = (
+        "import json, sys, der\n"
+        "scene = der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=32)\n"
+        f"{work}\n"
+        f"print(json.dumps([n for n in {(*SPATIAL, *OPTIONAL)!r} if n in sys.modules]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout) == ["shapely"] * area
+
+
+def test_a_planar_scene_allocates_one_unknown_an_edge():
+    """What it asks for at most is less than half of what the rod in space does, at equal edges."""
+    piece = sector(der.circle(), der.rectangular_section(4.0), 1024, name="full")
+    state = piece.start
+    given = (state.quat, state.stretch, state.force, state.load)
+    ring = planar_ring(der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=1024))
+    rod, phi = ring.rod(1), covered(ring, 1)
+
+    def in_space():
+        assemble(piece.body, piece.held, *given)
+
+    def in_plane():
+        assemble_planar(rod, phi, np.zeros(2), 0.0)
+
+    for load in (in_space, in_plane):
+        load()  # kernels are no memory of the work
+    assert peak_memory(in_plane) < 0.5 * peak_memory(in_space)

@@ -1,16 +1,27 @@
 """What each need of a scene costs, over the same path without it: CPU time and memory.
 
-A need is what may be asked for or left out. Twist cannot be left out: a frame turns about three
-axes, and the kernels know no rod that does not. Neither can anisotropy; its rows say that a section
-with two stiffnesses costs what one with a single stiffness does. Memory is what is asked of the
-system: a history reserves room for the longest snap there can be, most of it never touched.
+A need is what may be asked for or left out. A ring that stays in its plane leaves out twist and the
+way out: its rows are the rod with one unknown an edge over the one in space, from state to state of
+one path. Where a ring leaves its plane twist cannot be left out, for a frame turns about three
+axes; neither can anisotropy: its rows say that a section with two stiffnesses costs what one with
+a single stiffness does. Memory is what is asked of the system: a history reserves room for the
+longest snap there can be, most of it never touched.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 
+import numpy as np
+
 import der
+from der.equilibrium import equilibrium
+from der.landscape_alone import balance
+from der.landscape_curve import scene_sector
+from der.landscape_tools import struts
+from der.planar_march import solved
+from der.planar_ring import covered, planar_ring
 from der.sections import section
 from validation.bench_paths import circle
 from validation.bench_rows import Row, measured
@@ -60,6 +71,7 @@ def rows(repeats: int, n_edges: int = 64) -> Iterator[Row]:
         yield Row("need", name, taken / before, "times", None, _added(taken - before, peak - held))
     yield from _outputs(repeats, seconds, n_edges)
     yield from _always(repeats, seconds, n_edges)
+    yield from _planar(repeats, n_edges)
 
 
 def _outputs(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
@@ -92,6 +104,42 @@ def _always(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
         done = measured(lambda scene=scene: der.fold(scene), repeats, memory=False)  # type: ignore[misc]
         each = 1e6 * done.cpu / done.result.timing.newton_iterations
         yield Row("need", f"{name}, per Newton iteration", each, "us")
+
+
+def _planar(repeats: int, n_edges: int) -> Iterator[Row]:
+    """A circle squeezed from state to state, in its plane and in space, with a strut in it."""
+    for n in (n_edges, 16 * n_edges):
+        scene = circle(4.0, n_edges=n, **BARE)
+        mesh = planar_ring(scene)
+        flat = solved(mesh.rod(1), covered(mesh, 1), np.zeros(2))
+        first = float(mesh.way() @ (mesh.length * np.sin(flat.phi)))
+        lengths = np.linspace(first, 0.1 * first, 19)
+        whole = scene_sector(scene, "full")
+        tool = struts(balance(whole.body, whole.start.quat, whole.start.stretch), (0, n // 2))[-1]
+
+        def in_plane(mesh=mesh, flat=flat, lengths=lengths) -> tuple[int, float]:  # type: ignore[no-untyped-def]
+            phi, force, count = np.append(flat.phi, 0.5 * math.pi), np.zeros(4), 0
+            rod = mesh.strutted()
+            for length in lengths:
+                at = solved(rod, phi, force, length)
+                phi, force, count = at.phi, at.force, count + at.iterations + 1
+            return count, at.moment
+
+        def in_space(tool=tool, lengths=lengths) -> tuple[int, float]:  # type: ignore[no-untyped-def]
+            state, count, piece = tool.piece.start, 0, tool.piece
+            for length in lengths:
+                at = equilibrium(piece.body, piece.held, state.but(load=tool.first - length))
+                state, count = at.state, count + at.iterations + 1
+            return count, -at.moment
+
+        plane = measured(in_plane, repeats, memory=False)
+        space = measured(in_space, repeats, memory=False)
+        off = abs(scene.section.alpha * plane.result[1] / space.result[1] - 1.0)
+        each = [1e9 * done.cpu / done.result[0] / n for done in (plane, space)]
+        note = f"{1e3 * plane.cpu:.2f} of {1e3 * space.cpu:.2f} ms for 19 states; "
+        note += f"{each[0]:.0f} of {each[1]:.0f} ns an edge and iteration; force {off:.0e} off"
+        name = f"none out of the plane: N {n}, full ring"
+        yield Row("need", name, plane.cpu / space.cpu, "times", None, note)
 
 
 def _folding(h_over_t: float, wants: Mapping[str, object], n_edges: int) -> Callable[[], object]:
