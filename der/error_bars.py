@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
-from der.frames import Array, rotation_vector
+from der.frames import Array
 from der.matching import ENERGY, GAMMA, LEVELS, MOMENT, RATE, Family, Place, placed, romberg
+from der.moved_folds import arc_lengths
 from der.sector import Sector
 from der.special import Visit
 
@@ -81,7 +82,7 @@ def error_bars(
     """
     family = Family(tuple(pieces), tolerance)
     places = [placed(family, visit, asked) for visit in visits]
-    order = _order(_arc_lengths(pieces[0], visits), places)
+    order = _order(arc_lengths(pieces[0], visits), places)
     scales = _scales(family, visits)
     kept = [places[k] for k in order]
     corrections = _Corrections.of(kept, scales)
@@ -107,17 +108,6 @@ def error_bars(
         slope_error,
         _how(pieces, bounds),
     )
-
-
-def _arc_lengths(piece: Sector, visits: Sequence[Visit]) -> Array:
-    """Distances (n,) of the visits from the first, along chords, in the norm of the path."""
-    mass, lengths = piece.body.mass, [0.0] * bool(visits)
-    for a, b in pairwise(visits):
-        turn = rotation_vector(a.at.state.quat, b.at.state.quat)
-        turn[~piece.held.free[:, :3]] = 0.0
-        rise = b.at.state.load - a.at.state.load
-        lengths.append(math.sqrt(float(np.sum(mass * turn**2)) + rise * rise))
-    return np.cumsum(lengths)
 
 
 def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:

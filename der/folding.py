@@ -125,10 +125,13 @@ def _with_error_bars(
     """The record with the values extrapolated from three meshes, and their errors.
 
     Indices, and the mode but for its slope, are those of the scene's own mesh, unknown where a
-    state passes a fold or branch point on its way to the extrapolated curve. Where the path of the
+    state passes a fold or branch point on its way to the extrapolated curve. Whether that reaches a
+    gamma asked for beside a fold is decided by the curve (`moved_folds`). Where the path of the
     coarsest ends elsewhere, so are all values, and no error is known.
     """
     from der.error_bars import error_bars
+    from der.matching import Family
+    from der.moved_folds import all_asked
 
     coarse = [_piece(scene, n, piece.name) for n in meshes(scene.n_edges, piece.name)[1:]]
     end = _end(coarse[-1], replace(wanted, most_steps=4 * len(visits) + 100))
@@ -141,7 +144,9 @@ def _with_error_bars(
         last = max(abs(visit.at.state.load) for visit in visits)
         most = math.ceil(last / EIGHTH)
         asked |= {k * EIGHTH for k in range(-most, most + 1)}
-    bars = error_bars([piece, *coarse], visits, asked, tolerance=scene.tolerance)
+    family = Family((piece, *coarse), scene.tolerance)
+    visits[:] = all_asked(family, wanted, visits, asked)
+    bars = error_bars(family.pieces, visits, asked, tolerance=scene.tolerance)
     place = {k: i for i, k in enumerate(bars.order)}
     singular = [k for k in place if visits[k].kind in ("fold", "branch")]
     for k, visit in enumerate(visits):

@@ -11,6 +11,8 @@ from numba import njit
 
 from der.frames import Array, relative, tangent
 
+_THIN = 0.1  # of 16: the size of the product of complex numbers below which digits are lost
+
 
 @njit(cache=True)
 def twist(quat):
@@ -47,6 +49,8 @@ def _solid_angles(x, i):
     The directions to an edge make a quadrilateral a, b, c, d; its two triangles (Van Oosterom &
     Strackee 1983) are arguments of complex numbers, added by multiplying these. The area is below
     2 pi, so half of it never leaves the principal branch. Edge k + 1 takes over two corners of k.
+    Where an edge all but touches another, corners lie opposite each other and the complex numbers
+    all but vanish: there `_quadrilateral` keeps the digits.
     """
     n = x.shape[0]
     start = i - 1 if i > 0 else n - 1
@@ -58,6 +62,7 @@ def _solid_angles(x, i):
     da = dx * ax + dy * ay + dz * az
     total = 0.0
     for _ in range(n - 3):
+        first = k
         k = k + 1 if k + 1 < n else 0
         bx, by, bz = x[k, 0] - x[start, 0], x[k, 1] - x[start, 1], x[k, 2] - x[start, 2]
         cx, cy, cz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
@@ -71,11 +76,49 @@ def _solid_angles(x, i):
         acd = -(ux * dx + uy * dy + uz * dz)
         r1 = (a * b + ax * bx + ay * by + az * bz) * c + bc * a + ca * b
         r2 = (a * c + ca) * d + (cx * dx + cy * dy + cz * dz) * a + da * c
-        total -= 2.0 * np.arctan2(abc * r2 + acd * r1, r1 * r2 - abc * acd)
+        sine, cosine = abc * r2 + acd * r1, r1 * r2 - abc * acd
+        if abs(sine) + abs(cosine) > _THIN * a * a * b * c * c * d:
+            total -= 2.0 * np.arctan2(sine, cosine)
+        else:
+            total -= _quadrilateral(x[start], x[i], x[first], x[k])
         ax, ay, az, a = bx, by, bz, b
         dx, dy, dz, d = cx, cy, cz, c
         da = bc
     return total
+
+
+@njit(cache=True)
+def _quadrilateral(p, q, r, s):
+    """Signed area, on the sphere, of the directions from the edge pq to the edge rs.
+
+    The sum of arcsines of Klenin & Langowski (Eq. 16), each as an arctangent. The normals of the
+    four sides are products with the edges themselves, which are exact where corners are opposite
+    or all but equal, and that of two normals is a corner times the triple product they all share.
+    """
+    A, B, C, D = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    a2, b2, c2, d2, triple = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        ej, ek, fj, fk = q[j] - p[j], q[k] - p[k], s[j] - r[j], s[k] - r[k]
+        A[i] = (r[j] - p[j]) * fk - (r[k] - p[k]) * fj
+        B[i] = ej * (s[k] - p[k]) - ek * (s[j] - p[j])
+        C[i] = fj * (s[k] - q[k]) - fk * (s[j] - q[j])
+        D[i] = (r[j] - q[j]) * ek - (r[k] - q[k]) * ej
+        a2 += (r[i] - p[i]) ** 2
+        b2 += (s[i] - p[i]) ** 2
+        c2 += (s[i] - q[i]) ** 2
+        d2 += (r[i] - q[i]) ** 2
+        triple += (r[i] - p[i]) * (ej * fk - ek * fj)
+    ab, bc, cd, da = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        ab += A[i] * B[i]
+        bc += B[i] * C[i]
+        cd += C[i] * D[i]
+        da += D[i] * A[i]
+    size = abs(triple)
+    area = np.arctan2(ab, np.sqrt(b2) * size) + np.arctan2(bc, np.sqrt(c2) * size)
+    area += np.arctan2(cd, np.sqrt(d2) * size) + np.arctan2(da, np.sqrt(a2) * size)
+    return area * np.sign(triple)
 
 
 @njit(cache=True)

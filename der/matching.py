@@ -34,7 +34,7 @@ RATE = 3  # added to these: columns of the rates along the path
 
 _PROBE = 1e-3  # of s: the first step towards a fold or limit, whose second derivative is not known
 _SMALL = 1e-6  # of s: a step that is as good as its linear prediction, to the square of this
-_FARTHEST = 0.3  # of s: about two steps of the path; what is sought lies h^2 away
+FARTHEST = 0.3  # of s: about two steps of the path; what is sought lies h^2 away
 _MOST = 12  # steps of the secant method
 
 
@@ -88,6 +88,11 @@ class Family:
 
     def near(self, base: Equilibrium, s: float) -> Matched | None:
         """The matched states at the distance ``s`` along the path of the finest mesh."""
+        at = self.beside(base, s)
+        return None if at is None else self.matched(at)
+
+    def beside(self, base: Equilibrium, s: float) -> Equilibrium | None:
+        """The state on the finest mesh at the distance ``s`` from another; None without one."""
         piece, t = self.pieces[0], base.tangent
         at = equilibrium(
             piece.body,
@@ -97,7 +102,7 @@ class Family:
             control=Control.DIRECTION,
             tolerance=self.tolerance,
         )
-        return self.matched(at) if at.converged else None
+        return at if at.converged else None
 
 
 def _normal(piece: Sector, q: Array, load: float) -> Direction:
@@ -162,6 +167,8 @@ class Goal(NamedTuple):
 def _goal(visit: Visit, asked: Collection[float]) -> Goal | None:
     """What a visited state stands for; None: for nothing but a place on the curve."""
     load = visit.at.state.load
+    if visit.sought is not None:
+        return Goal(GAMMA, *visit.sought)
     if visit.kind == "fold":
         return Goal(RATE + GAMMA, 0.0, 0.0)
     if visit.kind == "limit":
@@ -193,7 +200,7 @@ def _sought(family: Family, base: Equilibrium, here: Matched, goal: Goal) -> Pla
         if slope and abs(step) <= _SMALL:
             return _found(goal, s + step, _advanced(here, step, bend), slope, bend)
         s += step
-        new = family.near(base, s) if abs(s) < _FARTHEST else None
+        new = family.near(base, s) if abs(s) < FARTHEST else None
         if new is None:
             return None
         bend = (new.table[:, RATE:] - here.table[:, RATE:]) / step

@@ -1,7 +1,8 @@
 """Marching by dynamic relaxation alone: no Hessian, no factorisation, only forces.
 
 The grips turn in steps, and after each the ring comes to rest from where the last states lead. A
-state that rests elsewhere has snapped.
+state that rests elsewhere has snapped, and so has one whose energy is not that of the last and the
+work of the grips in between: a long step reaches other branches that lie close by.
 """
 
 from __future__ import annotations
@@ -10,22 +11,20 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from der import relaxation
-from der.equilibrium import Direction, Equilibrium, Outcome, dot, moved
-from der.frames import rotation_vector
+from der.equilibrium import Direction, Equilibrium, moved
 from der.relaxation import Relaxed, relax
 from der.rod import State
 from der.sector import Sector
-from der.snap import Landing, heading
+from der.snap import Landing
 from der.special import Visit, Wanted
 from der.step import Stuck, Tally
+from der.trail import CLOSE, ahead, change, is_work, longer, rested, went_on
 
 RISE = math.pi / 64.0  # rad, step of a march by dynamic relaxation alone
 RESOLUTION = 1e-6  # rad, of where such a march finds a snap
-CLOSE = 1e-9  # rad: states nearer than this tell no rates by their differences
-_MISS = 0.1  # rad, root mean square: a state further from the extrapolation has snapped
+_LONGER = 4.0  # times the last step: further ahead, nothing is known of where states lead
+_NARROW = 0.01  # of the way between two states, a parabola through a limit of M
 
 
 def follow_relaxed(
@@ -118,100 +117,36 @@ def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Visit]:
     """Relaxed states at the loads of a march, with landings where the ring has snapped."""
     piece = walk.piece
     first = walk.relaxed(piece.start if start is None else start.state)
-    trail = [_rested(piece, [], first)]
+    trail = [rested(piece, [], first)]
     yield Visit(trail[-1])
+    largest = 0.0  # moment so far
     loads = walk.loads(first.state.load)[::-1]
     while loads:
-        found = walk.relaxed(_ahead(piece, trail, loads[-1]))
+        here = trail[-1].state.load
+        if len(trail) > 1:
+            longest = _LONGER * (here - trail[-2].state.load)
+            if abs(loads[-1] - here) > abs(longest):
+                loads.append(here + 0.5 * longest)
+        found = walk.relaxed(ahead(piece, trail, loads[-1]))
         walk.tally.steps += 1
-        if _went_on(piece, trail, found):
+        largest = max(largest, abs(found.moment))
+        if went_on(piece, trail, found) and is_work(trail, found, largest):
             loads.pop()
-            rested = _rested(piece, trail, found)
-            if abs(rested.state.load - trail[-1].state.load) > CLOSE:
-                trail = [*trail[-2:], rested]
-            yield Visit(rested)
-        elif abs(loads[-1] - trail[-1].state.load) > RESOLUTION:
-            loads.append(0.5 * (trail[-1].state.load + loads[-1]))
+            at = rested(piece, trail, found)
+            trail = longer(piece, trail, found)
+            yield Visit(at)
+        elif abs(loads[-1] - here) > RESOLUTION:
+            loads.append(0.5 * (here + loads[-1]))
         else:
             landing = _landed(walk, trail, loads.pop())
             trail = [landing.at]
             yield landing
 
 
-def _ahead(piece: Sector, trail: list[Equilibrium], load: float) -> State:
-    """State at ``load`` extrapolated from the last three, or as many as there are."""
-    here = trail[-1]
-    rise = load - here.state.load
-    rate = heading(piece, 1.0)
-    if len(trail) > 1:
-        rate = _per_load(here)
-    if len(trail) > 2:
-        older = _per_load(trail[-2])
-        # rates are means over their steps: from the middle of the last two to that of the next
-        span = 0.5 * (here.state.load - trail[-3].state.load)
-        lead = 0.5 * (load - trail[-2].state.load) / span
-        rate = rate._replace(q=rate.q + lead * (rate.q - older.q))
-    return moved(piece.held, here.state, Direction(rise * rate.q, 0.0 * rate.force, rise)).but(
-        load=load
-    )
-
-
-def _per_load(at: Equilibrium) -> Direction:
-    """Mean rate of change over the last step, per unit of load."""
-    return Direction(at.tangent.q / at.tangent.load, 0.0 * at.tangent.force, 1.0)
-
-
-def _change(piece: Sector, a: State, b: State) -> Direction:
-    """The increment that takes one state to another."""
-    q = np.zeros(piece.held.free.shape)
-    q[:, :3] = rotation_vector(a.quat, b.quat)
-    if piece.body.block == 4:
-        q[:, 3] = b.stretch - a.stretch
-    q[~piece.held.free] = 0.0
-    return Direction(q, b.force - a.force, b.load - a.load)
-
-
-def _went_on(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> bool:
-    """Whether a state lies where the last ones lead, and not where the ring has snapped to."""
-    miss = _change(piece, _ahead(piece, trail, found.state.load), found.state)
-    return math.sqrt(dot(piece.body, miss, miss)) < _MISS
-
-
-def _rested(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> Equilibrium:
-    """A relaxed state as an equilibrium: its rates are differences along the trail behind it."""
-    tangent, slope = heading(piece, 1.0), 0.0
-    if trail:
-        last = trail[-1]
-        step = _change(piece, last.state, found.state)
-        norm = math.sqrt(dot(piece.body, step, step))
-        tangent, slope = last.tangent, last.slope  # where the two are one state
-        apart = abs(step.load) > CLOSE
-        if apart:
-            tangent = Direction(step.q / norm, step.force / norm, step.load / norm)
-            slope = (found.moment - last.moment) / step.load
-        if apart and len(trail) > 1:
-            before = trail[-2]
-            older = (last.moment - before.moment) / (last.state.load - before.state.load)
-            slope += step.load * (slope - older) / (found.state.load - before.state.load)
-    return Equilibrium(
-        found.state,
-        Outcome.CONVERGED,
-        -1,
-        0,
-        found.residual,
-        found.energy,
-        found.moment,
-        tangent,
-        slope * tangent.load,
-        -1,
-        0.0,
-    )
-
-
 def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
     """The state that a ring has snapped to between the last state of a trail and ``load``."""
     piece, before = walk.piece, trail[-1]
-    found = walk.relaxed(_ahead(piece, trail, load), walk.every)
+    found = walk.relaxed(ahead(piece, trail, load), walk.every)
     rise = load - before.state.load
     energy = piece.copies * (before.energy + before.moment * rise)
     details: dict[str, object] = {
@@ -225,7 +160,7 @@ def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
         "force_evaluations": found.evaluations,
     }
     energies = tuple(piece.copies * float(e) for e in found.energies)
-    at = _rested(piece, [], found)
+    at = rested(piece, [], found)
     return Landing(at, "snap", details=details, history=found.history, energies=energies)
 
 
@@ -256,13 +191,24 @@ def _with_limits(walk: _Walk, states: Iterator[Visit]) -> Iterator[Visit]:
 
 
 def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Visit:
-    """The limit of the moment among three relaxed states, by ever narrower parabolas."""
-    trail = [a, b, c]
-    for narrower in (0.1, 0.01, 0.0):
-        load = _vertex(trail)
-        h = narrower * (c.state.load - a.state.load)
-        trail = [_between(walk, a, c, x) for x in sorted({load - h, load, load + h})]
-    return Visit(trail[0], "limit")
+    """The limit of the moment among three relaxed states: bracketed (Brent), then by a parabola.
+
+    All of their states lie between the three: a little beyond, there may be a snap. Towards a fold
+    the moment is no parabola, and the first that comes to mind is far off.
+    """
+    from scipy.optimize import minimize_scalar
+
+    low, high = sorted((a.state.load, c.state.load))
+    h = _NARROW * (high - low)
+    sign = 1.0 if b.moment < a.moment else -1.0
+
+    def moment(load: float) -> float:
+        return sign * _between(walk, a, c, load).moment
+
+    found = minimize_scalar(moment, bounds=(low, high), method="bounded", options={"xatol": h})
+    load = min(max(float(found.x), low + h), high - h)
+    load = _vertex([_between(walk, a, c, x) for x in (load - h, load, load + h)])
+    return Visit(_between(walk, a, c, min(max(load, low), high)), "limit")
 
 
 def _vertex(trail: list[Equilibrium]) -> float:
@@ -270,13 +216,13 @@ def _vertex(trail: list[Equilibrium]) -> float:
     x, y, z = (at.state.load for at in trail)
     p, q, r = (at.moment for at in trail)
     first, second = (q - p) / (y - x), (r - q) / (z - y)
-    return 0.5 * (x + y) - 0.5 * first * (z - x) / (second - first)
+    return y if first == second else 0.5 * (x + y) - 0.5 * first * (z - x) / (second - first)
 
 
 def _between(walk: _Walk, a: Equilibrium, c: Equilibrium, load: float) -> Equilibrium:
     """The relaxed state at a load between those of two others."""
     part = (load - a.state.load) / (c.state.load - a.state.load)
-    step = _change(walk.piece, a.state, c.state)
+    step = change(walk.piece, a.state, c.state)
     guess = Direction(part * step.q, 0.0 * step.force, load - a.state.load)
     found = walk.relaxed(moved(walk.piece.held, a.state, guess).but(load=load))
-    return _rested(walk.piece, [a], found)
+    return rested(walk.piece, [a], found)

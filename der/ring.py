@@ -333,10 +333,13 @@ def triangle_in_degrees(vertex_angle: float, r_over_a: float) -> Ring:
     r = _fillet(r_over_a, inscribed, "the inscribed circle's radius")
     base_turn, apex_turn = (np.pi + apex) / 2, np.pi - apex
     base_cut, apex_cut = r * math.tan(base_turn / 2), r * math.tan(apex_turn / 2)
+    straights = 1 / 2 - base_cut, 1 / 2 / math.sin(apex / 2) - base_cut - apex_cut
+    if r == inscribed:  # a circle; what rounding leaves of a straight would bend one arm alone
+        straights = 0.0, 0.0
     half = [
-        straight(1 / 2 - base_cut),
+        straight(straights[0]),
         arc(r, base_turn),
-        straight(1 / 2 / math.sin(apex / 2) - base_cut - apex_cut),
+        straight(straights[1]),
         arc(r, apex_turn / 2),
     ]
     return Ring(
@@ -405,14 +408,14 @@ def _semi_minor(b_over_a: object) -> float:
 
 
 def _fillet(r_over_a: object, largest: float, which: str) -> float:
-    # A largest fillet that the user computed may differ from ours in rounding.
+    # A largest fillet that the user computed may differ from ours in rounding, to either side.
     r = checked_number(
         "r_over_a",
         r_over_a,
         f"a number in (0, {largest:.12g}], at least {SMALLEST:g} and at most {which}",
         lambda number: SMALLEST <= number <= largest * (1 + 1e-12),
     )
-    return min(r, largest)
+    return r if r < largest * (1 - 1e-12) else largest
 
 
 def _oriented(b: float, twist_axis: object) -> tuple[float, float]:

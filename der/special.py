@@ -9,7 +9,7 @@ contact  the linking number changes: a strand passes through another
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -20,7 +20,7 @@ from der.equilibrium import Equilibrium
 from der.rod import strains
 from der.sector import Sector
 from der.stability import index_and_stiffness
-from der.step import Step
+from der.step import ROOT, Step
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-4  # of s, for the passage of a strand: an ideal ring asks for no more
@@ -29,6 +29,7 @@ _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 # of the softest torsion of a ring, GJ (2 pi/L)^2: within a step a mode's stiffness was seen to
 # bulge by 0.002 of it at the median and by 0.06 in one of a hundred
 _SOFT = 0.1
+_AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way
 _NEARLY = 0.25  # of the softer end: a parabola that comes so close to zero is looked at
 
 
@@ -46,6 +47,8 @@ class Visit:
     sides: tuple[Indices, Indices] | None = None  # index before and after a singular state
     link: int | None = None
     details: Mapping[str, object] = field(default_factory=dict)
+    # the load that it stands for on an extrapolated curve, and the sign of d load/ds there
+    sought: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ def _folds(step: Step) -> list[tuple[float, Equilibrium]]:
     places = [(s, step.at(s)) for s in cuts]
     return [
         step.change(lambda at: at.tangent.load, low, high)
-        for low, high in pairwise(places)
+        for low, high in pairwise(_cut(step, places, lambda at: (at.state.load, at.tangent.load)))
         if low[1].tangent.load * high[1].tangent.load < 0.0
     ]
 
@@ -142,6 +145,39 @@ def _slowest(length: float, jump: float, first: float, last: float) -> list[floa
         return []
     rate = first + (2.0 * c2 + 3.0 * c3 * u) * u
     return [u * length] if rate * first < 0.1 * first * first else []
+
+
+def _cut(
+    step: Step,
+    places: list[tuple[float, Equilibrium]],
+    value: Callable[[Equilibrium], tuple[float, float]],
+) -> list[tuple[float, Equilibrium]]:
+    """Places with one more wherever a value changes against its rates at two of them.
+
+    In between the rate has the other sign, on however short a way: by bisection. Where a ring is
+    stretched all but taut, M so leaps from one end of its range to the other.
+    """
+    cut = places[:1]
+    for low, high in pairwise(places):
+        end = high
+        while high[0] - low[0] > ROOT:
+            (first, rate), (last, other) = value(low[1]), value(high[1])
+            least = _AGAINST * max(abs(rate), abs(other)) * (high[0] - low[0])
+            if rate * other <= 0.0 or (last - first) * math.copysign(1.0, rate) >= -least:
+                break
+            s = 0.5 * (low[0] + high[0])
+            middle = (s, step.at(s))
+            between, turned = value(middle[1])
+            if turned * rate < 0.0:
+                cut.append(middle)
+                break
+            # it is against its rates on one of the halves at least
+            if (between - first) * rate < 0.0:
+                high = middle
+            else:
+                low = middle
+        cut.append(end)
+    return cut
 
 
 def _at_targets(
@@ -194,7 +230,8 @@ def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
             b.s - a.s, last.moment - first.moment, first.moment_rate, last.moment_rate
         )
         middle = [(a.s + u, step.at(a.s + u)) for u in inside]
-        for low, high in pairwise([(a.s, first), *middle, (b.s, last)]):
+        places = [(a.s, first), *middle, (b.s, last)]
+        for low, high in pairwise(_cut(step, places, lambda at: (at.moment, at.moment_rate))):
             if low[1].moment_rate * high[1].moment_rate < 0.0:
                 s, at = step.change(lambda at: at.moment_rate, low, high)
                 found.append(_Mark(s, Visit(at, "limit")))

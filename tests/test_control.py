@@ -2,6 +2,7 @@
 
 import functools
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,12 +12,13 @@ from rods import solved
 import der
 from der.control import follow_angle, follow_moment
 from der.path import follow
-from der.relaxed_march import RESOLUTION, follow_relaxed
+from der.relaxed_march import RESOLUTION, RISE, _Walk, follow_relaxed
 from der.sector import Sector, sector
 from der.snap import Landing
 from der.special import Visit, Wanted
 from der.stability import all_modes, index
 from der.step import Stuck, Tally
+from der.trail import ahead, is_work, longer, rested, went_on
 
 FOLLOWERS = {"angle": follow_angle, "moment": follow_moment, "relaxed": follow_relaxed}
 
@@ -359,6 +361,60 @@ def test_relaxation_finds_the_limits_of_the_moment():
     for a, b in zip(here, there, strict=True):
         assert abs(piece.moment(a.at.moment - b.at.moment)) < 1e-7
         assert abs(a.at.state.load - b.at.state.load) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("ring", "n_edges", "h_over_t", "nu", "curvature"),
+    [
+        (der.circle(), 16, 1.839582, 0.5, "logarithm"),
+        (der.circle(), 32, 1.6, 0.3, "logarithm"),
+        (der.rectangle(1.0, 0.005, "y"), 16, 1.8255877666514193, 0.2903264319264113, "angle"),
+    ],
+    ids=["circle 16", "circle 32", "square 16"],
+)
+def test_relaxation_on_few_edges_finds_what_newton_does(ring, n_edges, h_over_t, nu, curvature):
+    """Limits 1e-3 rad before a fold, and the snap past it, in steps of 0.05 rad.
+
+    Once a parabola through the steps put the limit beyond the fold, on another branch.
+    """
+    piece = sector(ring, der.rectangular_section(h_over_t, nu), n_edges, measure=curvature)
+    wanted = Wanted(stability=False, contacts=False)
+    here, there = (
+        [v for v in follower(piece, wanted, Tally()) if v.kind in ("limit", "snap")]
+        for follower in (follow_relaxed, follow_angle)
+    )
+    assert [v.kind for v in here] == [v.kind for v in there]
+    assert "snap" in [v.kind for v in here]
+    for a, b in zip(here, there, strict=True):
+        assert a.at.state.load == pytest.approx(b.at.state.load, abs=5e-6)
+        assert a.at.moment == pytest.approx(b.at.moment, abs=1e-5)
+
+
+def test_a_jump_shorter_than_what_is_noticed_shows_in_its_energy():
+    """A state that is near enough, whose energy is not that of the last and the work in between."""
+    piece = sector(der.circle(), der.rectangular_section(4.0), 32)
+    walk = _Walk(piece, Wanted(stability=False), Tally(), RISE, 1e-9, 0)
+    trail = [rested(piece, [], walk.relaxed(piece.start))]
+    for load in (0.02, 0.04, 0.06):
+        found = walk.relaxed(ahead(piece, trail, load))
+        assert went_on(piece, trail, found)
+        assert is_work(trail, found, abs(found.moment))
+        trail = longer(piece, trail, found)
+    fallen = replace(found, energy=found.energy - 3e-3 * found.moment * 0.02)
+    assert went_on(piece, trail[:-1], fallen)
+    assert not is_work(trail[:-1], fallen, abs(found.moment))
+
+
+def test_a_state_all_but_beside_the_last_one_does_not_lead_the_way():
+    """Differences over 1e-7 rad would magnify the residual to what a step of 0.05 turns."""
+    piece = sector(der.circle(), der.rectangular_section(4.0), 32)
+    walk = _Walk(piece, Wanted(stability=False), Tally(), RISE, 1e-9, 0)
+    trail = [rested(piece, [], walk.relaxed(piece.start))]
+    for load in (0.05, 0.1, 0.1 + 1e-7):
+        trail = longer(piece, trail, walk.relaxed(ahead(piece, trail, load)))
+    assert [at.state.load for at in trail] == [0.0, 0.05, 0.1 + 1e-7]
+    assert abs(walk.relaxed(ahead(piece, trail, 0.15)).state.load - 0.15) < 1e-15
+    assert went_on(piece, trail, walk.relaxed(ahead(piece, trail, 0.15)))
 
 
 def test_slope_without_a_hessian_is_of_second_order():

@@ -21,6 +21,7 @@ from der.sector import sector
 from der.special import Visit, Wanted
 from der.step import Tally
 from validation.curves import ReferenceCurve, curve_error, fold_error, read_reference
+from validation.solving import solve
 
 REFERENCE = Path(__file__).parents[1] / "validation" / "reference"
 NAMES = {4.0: "circ_ht4", 1.6: "circ_ht1.6", 1.0: "circ_ht1_beyond_pi"}
@@ -272,3 +273,31 @@ def test_meshes_of_two_kinds_give_no_errors(n_edges, arrives):
     assert (path.gamma[-1] > 0.0) == arrives
     assert all(e is None for e in path.error["energy"]) == arrives
     assert ("40 edges the path ends" in path.error["how"]) == arrives
+
+
+@pytest.mark.parametrize(
+    ("ring", "h_over_t", "nu", "gamma", "count"),
+    [
+        (der.circle(), 1.4774379970403035, 0.18919980323084623, 7 * math.pi / 8, 3),
+        (der.ellipse(0.7979864146753555, "y"), 1.7045583528246633, 0.01, 3 * math.pi / 4, 1),
+    ],
+    ids=["reached", "left"],
+)
+def test_states_between_a_fold_and_its_extrapolation_are_those_of_the_curve(
+    ring, h_over_t, nu, gamma, count
+):
+    """On 64 edges a fold stops short of a gamma that was asked for, or does not; the curve decides.
+
+    Every state of the boundary-value problem is there, within the error bars, and no other.
+    """
+    scene = der.Scene(ring, der.rectangular_section(h_over_t, nu), error_bars=True)
+    path, reference = der.fold(scene), solve(scene, tolerance=1e-9)
+    raw = np.array(path.raw["gamma"])
+    folds = [(raw[p.position], p.gamma) for p in path.folds]
+    assert sum((a - gamma) * (b - gamma) < 0.0 for a, b in folds) == 1
+    here, there = (np.flatnonzero(one.gamma == gamma) for one in (path, reference))
+    assert len(here) == len(there) == count
+    for name in ("moment", "energy"):
+        off = np.abs(getattr(path, name)[here] - getattr(reference, name)[there])
+        assert np.all(off <= np.array(path.error[name], dtype=float)[here])
+    assert path.index[here].tolist() == [0, 1, 0][:count]

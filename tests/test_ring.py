@@ -357,6 +357,21 @@ def test_largest_fillets_make_a_circle_of_a_triangle():
     assert ring.length == pytest.approx(2 * np.pi * inscribed(1.0), rel=1e-13)
 
 
+@pytest.mark.parametrize("off", [-5e-13, 0.0, 5e-13])
+@pytest.mark.parametrize("degrees", [10.0, 60.0, 157.714334984678, 179.0])
+def test_rounding_of_the_largest_fillet_leaves_no_straights(degrees, off):
+    """The angle is rounded to 1e-12 degrees, and so is the radius that a user computes from it.
+
+    A straight of 1e-13 on one side of a frame in one arm, on the other in the other, would bend the
+    two unequally.
+    """
+    angle = math.radians(degrees)
+    ring = triangle(angle, inscribed(angle) * (1.0 + off))
+    assert ring.breaks == ()
+    turn = np.diff(ring.natural_angle(np.linspace(0.0, ring.length, 129)))
+    assert_allclose(turn, 2.0 * np.pi / 128.0, rtol=1e-12)
+
+
 def test_vertex_angle_is_in_degrees_in_the_record():
     """Radians in Python, degrees in files."""
     assert triangle(math.pi / 3, 0.1).to_json() == {

@@ -1,6 +1,7 @@
 """What `der.special` finds on the steps of a path, where special points lie close together."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from der.branches import is_fold
 from der.equilibrium import dot
 from der.path import follow
 from der.sector import sector
-from der.special import Wanted, _closest, special_points, visit
+from der.special import Wanted, _closest, _cut, special_points, visit
 from der.stability import index, index_and_stiffness, raw_index, softest_modes
 from der.step import Step, Tally
 
@@ -243,3 +244,25 @@ def test_a_fold_is_told_from_a_branch_point(ring, h_over_t, name, kinds):
             assert is_fold(step, s + off) == (one.kind == "fold")
         seen.add(one.kind)
     assert seen == kinds
+
+
+class Leap:
+    """A step on which a value falls, but for a leap at s = 0.37 on a way of 1e-6."""
+
+    def __init__(self, height: float) -> None:
+        self.height = height
+
+    def at(self, s: float) -> tuple[float, float]:
+        """Return the value at ``s`` and its rate."""
+        u = (s - 0.37) / 1e-6
+        rate = self.height / 1e-6 / math.cosh(u) ** 2 if abs(u) < 300.0 else 0.0
+        return -s + self.height * math.tanh(u), -1.0 + rate
+
+
+@pytest.mark.parametrize(("height", "turns"), [(2.0, 2), (0.6, 2), (0.0, 0)])
+def test_a_leap_against_the_rates_at_both_ends_is_found(height, turns):
+    """If a value changes against its rates, it has turned twice in between (mean value theorem)."""
+    step = Leap(height)
+    ends = [(s, step.at(s)) for s in (0.0, 1.0)]
+    rates = [rate for _, (_, rate) in _cut(step, ends, lambda at: at)]
+    assert sum(a * b < 0.0 for a, b in pairwise(rates)) == turns
