@@ -45,9 +45,12 @@ app = typer.Typer(
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command and leave with its exit code."""
+    from der.unfinished import interrupts_heard
+
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
-        code = app(args=arguments or ["--help"], prog_name="der", standalone_mode=False)
+        with interrupts_heard():
+            code = _run(arguments or ["--help"])
     except typer.TyperException as wrong:
         text = " ".join(str(getattr(wrong, "message", wrong)).split())
         if hasattr(wrong, "format_message"):
@@ -55,13 +58,23 @@ def main(arguments: list[str] | None = None) -> None:
         say(f"der: {text}")
         code = 2
     except (typer.Abort, KeyboardInterrupt) as stopped:
-        if str(stopped):
-            say(f"der: {stopped}")
+        say(f"der: {str(stopped) or 'stopped by the user'}")
         code = 130
     except (OSError, RuntimeError) as wrong:  # a full disk; workers that cannot work
         say(f"der: {wrong}")
         code = 3
     sys.exit(code or 0)
+
+
+def _run(arguments: list[str]) -> int:
+    """Run the command as typer does, which says nothing about Ctrl-C."""
+    command = typer.main.get_command(app)
+    try:
+        with command.make_context("der", list(arguments)) as context:
+            code: int | None = command.invoke(context)
+    except typer.Exit as done:
+        code = done.exit_code
+    return code or 0
 
 
 def _show_version(wanted: bool) -> None:

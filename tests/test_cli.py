@@ -874,3 +874,13 @@ def test_an_interrupted_landscape_names_its_file(run, monkeypatch, kind):
     assert err[0].startswith("der: stopped by the user")
     assert err[0].endswith("; what was found is in der-unfinished.json")
     assert entries(File("der-unfinished.json").read_text())["status"] == "interrupted"
+
+
+def test_ctrl_c_before_the_command_begins_is_told(run, monkeypatch):
+    """While options are read: typer itself would leave without a word."""
+
+    def press(*_):
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("typer.core.TyperGroup.resolve_command", press)
+    assert run(*SMALL) == (130, "", ["der: stopped by the user"])

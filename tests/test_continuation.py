@@ -8,6 +8,7 @@ import pytest
 from bvp import system, visits
 
 import der
+from validation import continuation
 from validation.collocation import Collocation, Error, collocation
 from validation.continuation import Stuck, Tally, Visit, Wanted, follow, root
 from validation.sectors import sector
@@ -98,6 +99,27 @@ def test_errors_stay_below_the_tolerance(tolerance):
     errors = np.array([visit.error for visit in path])
     values = np.array([[math.pi, visit.at.moment, visit.at.energy] for visit in path])
     assert (errors / np.abs(values).max(axis=0)).max() <= tolerance
+
+
+def test_errors_are_relative_to_what_is_handed_out():
+    """A triangle with sharp corners, of a tall section.
+
+    A solution on too coarse a mesh, not handed out, has three times the moment of all that are.
+    """
+    ring = der.triangle(math.pi / 2, 0.005)
+    path = visits(system(ring, 38.331698305621025, 0.0), math.pi, 4.5e-7)
+    errors = np.array([visit.error for visit in path])
+    values = np.array([[math.pi, visit.at.moment, visit.at.energy] for visit in path])
+    assert (errors / np.abs(values).max(axis=0)).max() <= 4.5e-7
+
+
+def test_a_path_ends_where_it_has_taken_too_much(monkeypatch):
+    """Intervals of all steps together are counted, and the path says how many steps they were."""
+    monkeypatch.setattr(continuation, "MOST_WORK", 60)
+    tally = Tally()
+    with pytest.raises(Stuck, match=r"^the path has not ended after \d+ steps$"):
+        list(follow(system(der.circle(), 4.0), Wanted(), tally))
+    assert 60 <= tally.work < 100
 
 
 def test_a_tolerance_between_two_meshes_is_reached():

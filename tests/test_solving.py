@@ -1,6 +1,7 @@
 """From the scene to the record by the boundary-value problem: `validation.solving.solve`."""
 
 import math
+import signal
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from bvp import path, scene
 
 import der
 from der.sites import sites
+from validation import solving
 from validation.solving import solve
 
 EIGHTH = math.pi / 8
@@ -295,6 +297,21 @@ def test_interrupting_keeps_the_path(states):
         solve(scene(der.circle(), 4.0), progress=stop)
     assert caught.value.path.status == "interrupted"
     assert caught.value.path.gamma.tolist() == seen
+
+
+def test_ctrl_c_while_the_record_is_made_keeps_the_path(monkeypatch):
+    """Pressed while the shapes are sampled, all states found: interrupted, and whole."""
+    sampled = solving._shapes
+
+    def press_and_sample(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return sampled(*arguments)
+
+    monkeypatch.setattr(solving, "_shapes", press_and_sample)
+    with pytest.raises(der.Interrupted) as caught:
+        solve(scene(der.circle(), 4.0, shapes=True))
+    path = caught.value.path
+    assert (path.status, path.gamma[-1], len(path.shapes.x)) == ("interrupted", math.pi, len(path))
 
 
 def test_a_path_that_never_arrives_is_unfoldable_and_says_so():

@@ -6,6 +6,7 @@ import math
 import pathlib
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import der
 from der.equilibrium import ADVICE, Outcome
 from validation import stress as suite
 from validation import stress_checks
+from validation.random_rings import DENSE
 from validation.stress_cases import KINDS, Case, case_from_json, cases, noisy_points, scene_of
 from validation.stress_inputs import Argument, arguments, refusal
 
@@ -258,6 +260,21 @@ def test_a_good_path_has_no_faults(bar):
     assert not list(stress_checks.faults(scene, path))
     assert not list(suite._balance(scene, path, path.shapes))
     assert stress_checks.work_lost(path) < 1e-3
+
+
+def test_states_are_asked_for_where_the_curve_is_long_and_where_steps_were_short(bar):
+    """In order, up to the end, about `DENSE` to half a turn, and a share between any two states."""
+    _, path = bar
+    found = np.array(stress_checks.denser(path, math.pi))
+    assert np.all(np.diff(found) > 0.0)
+    assert (found[0], found[-1]) == (0.0, math.pi)
+    passes = 1 + len(path.folds)
+    assert DENSE / passes < len(found) < DENSE + 2 * len(path)
+    least = math.floor(0.5 * DENSE / len(path))
+    for low, high in pairwise(path.gamma):
+        low, high = sorted((low, high))
+        if high - low > 1e-4:
+            assert np.count_nonzero((found >= low - 1e-6) & (found <= high + 1e-6)) >= least
 
 
 def test_energy_that_is_not_work_is_seen(bar):

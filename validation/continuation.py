@@ -9,7 +9,7 @@ solution, and its number of intervals the estimated error.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
@@ -27,6 +27,7 @@ ANGLE = 0.15  # rad, aimed at between tangents of neighbouring states
 SHARPEST = 0.6  # rad, a step that turns more is repeated shorter
 STRAIGHT = 0.01  # bulge of a step that is believed although its ends are oriented unequally
 MOST_STEPS = 2000
+MOST_WORK = 200_000  # intervals of all steps together: a ring that winds up needs ever more of them
 FEWEST_INTERVALS, MOST_INTERVALS = 3, 4000
 REFIT = 4  # steps after which the mesh is fitted again
 IN_VAIN = 4.0  # times the intervals, which at order 8 leave 2e-5 of an error: where they leave
@@ -46,6 +47,7 @@ class Tally:
 
     newton_iterations: int = 0
     steps: int = 0
+    work: int = 0  # intervals of all steps, those to be repeated included
 
 
 class Visit(NamedTuple):
@@ -67,17 +69,31 @@ class Wanted:
 
 
 class Scales:
-    """The largest |M| and U met so far, at least those of a first small turn from the flat ring."""
+    """The largest |M| and U handed out so far, at least those of a first small turn."""
 
     def __init__(self, start: Solution, turn: float = FIRST_TURN) -> None:
         self.moment = turn * abs(start.slope)
         self.energy = 2.0 * turn**2 * abs(start.slope)
 
-    def largest(self, at: Solution, error: Error) -> float:
-        """The largest of the three errors, relative."""
-        self.moment = max(self.moment, abs(at.moment))
-        self.energy = max(self.energy, abs(at.energy))
-        return max(error.gamma / math.pi, error.moment / self.moment, error.energy / self.energy)
+    def largest(self, visits: Sequence[Visit]) -> float:
+        """The largest error of states not yet handed out, relative.
+
+        What is not handed out is not in the record, and no measure of what is: a solution on too
+        coarse a mesh may have any energy, and one beyond the end a larger than all before it.
+        """
+        moment, energy = self._with(visits)
+        return max(
+            max(v.error.gamma / math.pi, v.error.moment / moment, v.error.energy / energy)
+            for v in visits
+        )
+
+    def take(self, visits: Sequence[Visit]) -> None:
+        """Take note of states that are handed out."""
+        self.moment, self.energy = self._with(visits)
+
+    def _with(self, visits: Sequence[Visit]) -> tuple[float, float]:
+        moment = max(self.moment, *(abs(visit.at.moment) for visit in visits))
+        return moment, max(self.energy, *(abs(visit.at.energy) for visit in visits))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,11 +207,12 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
     length, age = FIRST_STEP, 0
     first: tuple[int, float] | None = None  # intervals and error that did not do for this step
     while True:
-        if tally.steps >= MOST_STEPS:
+        if tally.steps >= MOST_STEPS or tally.work >= MOST_WORK:
             raise Stuck(f"the path has not ended after {tally.steps} steps")
+        tally.work += len(here.mesh.h)
         step = _advance(system, tally, here, bend, length)
         error = system.error(step.end)
-        size = scales.largest(step.end, error)
+        size = scales.largest([Visit(step.end, error)])
         if size <= wanted.tolerance:
             try:
                 found, ended = _special_points(system, wanted, step, error)
@@ -205,7 +222,8 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
                     raise
                 length = 0.25 * step.length
                 continue
-            size = max(scales.largest(visit.at, visit.error) for visit in found)
+            # of a path that ends in its first step, errors are relative to what that step takes
+            size = scales.largest(found if tally.steps else [*found, Visit(step.end, error)])
         if size > wanted.tolerance:
             n_here = len(here.mesh.h)
             if first is None or not math.isfinite(first[1]):
@@ -217,6 +235,7 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
             bend, length, age = None, step.length, 0
             continue
         tally.steps += 1
+        scales.take(found)
         yield from found
         if ended:
             return
@@ -246,7 +265,7 @@ def _flat(system: Collocation, wanted: Wanted) -> tuple[Solution, Error, int]:
         if isinstance(found, Failure):
             raise Stuck(f"the flat ring is no solution: {found.reason}")
         error = system.error(found)
-        size = Scales(found).largest(found, error)
+        size = Scales(found).largest([Visit(found, error)])
         if size <= wanted.tolerance:
             return found, error, n
         if first is None or not math.isfinite(first[1]):

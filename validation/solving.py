@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from importlib.metadata import version
 
@@ -28,6 +28,7 @@ TOLERANCE = 1e-8
 FINEST, COARSEST = 1e-11, 1e-3
 ACROSS = 0.4  # of the tolerance: errors across the path, which at equal gamma show larger
 _FLAT = 1e-6  # out-of-plane extent of a folded ring, a
+STOPPED = "stopped by the user"
 HOW = (
     "change of the state, across the path, on a collocation mesh of half the intervals' length; "
     "Gauss collocation of 4 stages, of order 8 at the ends of intervals"
@@ -77,7 +78,6 @@ def solve_visits(
     """`solve`, and the solutions themselves."""
     check(scene, tolerance)
     system = collocation(sector(scene))
-    _load_kernels(system.sector.piece.quarter)
     until_folded = scene.until == "folded"
     beyond = scene.gamma_max > math.pi
     wanted = Wanted(
@@ -88,26 +88,30 @@ def solve_visits(
     )
     tally = Tally()
     visits: list[Visit] = []
-    started = time.perf_counter()
 
     def record(status: str, message: str = "") -> Path:
         timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
         return _record(scene, system, tolerance, visits, timing, status, message)
 
-    try:
-        with interrupts_between_states() as pressed:
+    with interrupts_between_states() as pressed:
+        _load_kernels(system.sector.piece.quarter)
+        started = time.perf_counter()
+        try:
             for visit in follow(system, wanted, tally):
                 visits.append(visit)
                 if progress is not None:
                     progress(visit.at.gamma)
                 if pressed:
                     raise KeyboardInterrupt
-    except Stuck as stuck:
-        raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
-    except KeyboardInterrupt:
-        raise Interrupted(record("interrupted", "stopped by the user")) from None
-    message = NEVER if visits[-1].at.gamma == -scene.gamma_max else ""
-    return record("done", message), visits
+        except Stuck as stuck:
+            raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
+        except KeyboardInterrupt:
+            pressed.clear()  # one more must not lose what there is
+            raise Interrupted(record("interrupted", STOPPED)) from None
+        path = record("done", NEVER if visits[-1].at.gamma == -scene.gamma_max else "")
+        if pressed:  # while the record was made
+            raise Interrupted(replace(path, status="interrupted", message=STOPPED))
+    return path, visits
 
 
 def check(scene: object, tolerance: object) -> None:

@@ -11,7 +11,6 @@ itself, a residual above the tolerance, energy that is not work.
 
 from __future__ import annotations
 
-import math
 import re
 import signal
 import sys
@@ -44,15 +43,16 @@ from der.sections import Scale, section
 from der.sector import sector
 from der.shapes import Shapes
 from der.snap import TO_AND_FRO
-from der.unfinished import NotConverged
+from der.unfinished import NotConverged, put_off
 from validation import collocation
 from validation.jobs import Jobs
-from validation.random_rings import DENSE, LOOSE
+from validation.random_rings import LOOSE
 from validation.solving import solve
 from validation.stress_cases import Case, case_from_json, cases, ring_of, scene_of, section_of
 from validation.stress_checks import (
     Fault,
     asymmetry,
+    denser,
     faults,
     outside_error_bars,
     too_uncertain,
@@ -288,8 +288,9 @@ def _time_limit(seconds: float) -> Iterator[None]:
     rang: list[int] = []
 
     def ring(number: int, frame: FrameType | None) -> None:
-        rang.append(number)
-        raise TimeoutError
+        if not put_off(number, frame):
+            rang.append(number)
+            raise TimeoutError
 
     usual = signal.signal(signal.SIGPROF, ring)
     signal.setitimer(signal.ITIMER_PROF, seconds)
@@ -297,7 +298,7 @@ def _time_limit(seconds: float) -> Iterator[None]:
         yield
     except BaseException:
         if not rang:
-            raise  # else it is what a kernel, or a clause in between, has made of the alarm
+            raise  # else it is what a clause in between has made of the alarm
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, usual)
@@ -362,10 +363,9 @@ def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator
     """Energy is work; where the states are too few to tell, they are asked for again, densely."""
     lost = work_lost(path)
     if lost > LOOSE and path.status == "done":
-        last = scene.gamma_max
-        turns = max(1, round(last / math.pi))
-        dense = tuple(np.linspace(0.0, last, DENSE * turns + 1).tolist())
-        wants = {name: getattr(scene, name) for name in _WANTS} | {"save_at": dense}
+        wants = {name: getattr(scene, name) for name in _WANTS} | {
+            "save_at": denser(path, scene.gamma_max)
+        }
         lost = work_lost(solver(Scene(scene.ring, scene.section, **wants)), asked=True)
     if lost > LOOSE and path.status == "done":
         yield "energy is not work", f"U and the integral of 4 M dgamma differ by {lost:.2g} of U"

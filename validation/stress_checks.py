@@ -18,7 +18,7 @@ from der.record import NEVER, Path, Point
 from der.scene import Scene
 from der.shapes import Shapes
 from der.sites import sites
-from validation.random_rings import LOOSE, largest_error, work_missing
+from validation.random_rings import DENSE, LOOSE, largest_error, work_missing
 
 Fault = tuple[str, str]  # a name, which is a reason in the summary, and a sentence
 
@@ -164,6 +164,24 @@ def work_lost(path: Path, *, asked: bool = False) -> float:
         if missing * scale > 1e-9:
             worst = max(worst, missing)
     return worst
+
+
+def denser(path: Path, last: float) -> tuple[float, ...]:
+    """Values of gamma up to ``last``, `DENSE` to a half turn, at which to ask for states again.
+
+    As many between any two neighbours as the curve of M is long there, and as the follower needed
+    steps: the moment of a stiff ring can rise and fall within a hundredth of a radian.
+    """
+    count = DENSE * max(1, round(last / math.pi))
+    scaled = np.column_stack([path.gamma / math.pi, path.moment / np.abs(path.moment).max()])
+    length = np.linalg.norm(np.diff(scaled, axis=0), axis=1)
+    shares = 0.5 * count * (length / length.sum() + 1.0 / len(length))
+    found = [
+        np.linspace(a, b, math.ceil(share) + 1)
+        for (a, b), share in zip(pairwise(path.gamma), shares, strict=True)
+    ]
+    gammas = np.concatenate(found).round(6)  # where a path turns back, not twice
+    return tuple(np.unique(gammas.clip(0.0, last)).tolist())
 
 
 def _part(path: Path, low: int, high: int) -> Path:
