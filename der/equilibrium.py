@@ -112,9 +112,16 @@ class Equilibrium:
 
 @njit(cache=True)
 def _correct(
-    rod, held, quat, stretch, force, load, control, row, row_load, moment, tolerance, most
-):
-    """Newton's method; ``row`` (n, b) and ``row_load`` are the mass-weighted direction."""
+    cell, length, mass, rest, stiffness, stretching, measure, closed,
+    free, weight, axis, target, turn, turn_axis, pull, reach,
+    quat, stretch, force, load, control, row, row_load, moment, tolerance, most,
+):  # fmt: skip
+    """Newton's method; ``row`` (n, b) and ``row_load`` are the mass-weighted direction.
+
+    Rod and supports come field by field: numba is slow to take named tuples apart.
+    """
+    rod = Rod(cell, length, mass, rest, stiffness, stretching, measure, closed)
+    held = Supports(free, weight, axis, target, turn, turn_axis, pull, reach)
     n, b = held.free.shape
     n_c = held.target.shape[0]
     quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
@@ -323,8 +330,8 @@ def equilibrium(
         row, row_load = body.mass * along.q, along.load
     c = Correction(
         *_correct(
-            body,
-            held,
+            *body,
+            *held,
             start.quat,
             start.stretch,
             start.force,

@@ -81,7 +81,7 @@ def error_bars(
     values on the extrapolated curve, but no errors.
     """
     family = Family(tuple(pieces), tolerance)
-    places = [placed(family, visit, asked) for visit in visits]
+    places = list(placed(family, visits, asked))
     order = _order(arc_lengths(pieces[0], visits), places)
     scales = _scales(family, visits)
     kept = [places[k] for k in order]

@@ -16,15 +16,15 @@ Sources: Richardson (1911), Phil. Trans. A 210; Romberg (1955), K. Norske Vid. S
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from der.equilibrium import Control, Direction, Equilibrium, dot, equilibrium, moved
+from der.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
 from der.frames import Array
-from der.rod import State
+from der.restriction import Restricted, restricted
 from der.sector import Sector
 from der.special import Visit
 
@@ -43,6 +43,7 @@ class Matched(NamedTuple):
 
     table: Array  # (LEVELS, 6) gamma, M, U and their rates per s, finest level first
     residual: float  # the largest of the three
+    coarse: Restricted | None = None  # where those of the coarser meshes lie
 
 
 @dataclass(frozen=True)
@@ -57,39 +58,41 @@ class Family:
         piece = self.pieces[level]
         return at.state.load, piece.moment(at.moment), piece.copies * at.energy
 
-    def matched(self, fine: Equilibrium) -> Matched | None:
-        """The states matched to one on the finest mesh; None where a level has none."""
-        q, load = fine.tangent.q, fine.tangent.load
-        speed = dot(self.pieces[0].body, _normal(self.pieces[0], q, load), fine.tangent)
-        lines, state, residual = [self._line(0, fine, 1.0)], fine.state, fine.residual
-        for level, piece in enumerate(self.pieces[1:], start=1):
-            q = np.ascontiguousarray(q[::2])
-            row = _normal(piece, q, load)
-            at = equilibrium(
-                piece.body,
-                piece.held,
-                _coarser(state),
-                along=row,
-                control=Control.DIRECTION,
-                tolerance=self.tolerance,
-            )
-            if not at.converged:
-                return None
-            lines.append(self._line(level, at, speed / dot(piece.body, row, at.tangent)))
-            state, residual = at.state, max(residual, at.residual)
-        return Matched(np.array(lines), residual)
+    def matched(self, fine: Equilibrium, near: Restricted | None = None) -> Matched | None:
+        """The states matched to one on the finest mesh; None where a level has none.
 
-    def _line(self, level: int, at: Equilibrium, speed: float) -> tuple[float, ...]:
-        """Values and rates at a level; ``speed`` turns the unit tangent to a rate per s."""
-        gamma, moment, energy = self.values(level, at)
+        ``near`` : those of a state nearby, to start from.
+        """
+        found = restricted(self.pieces, fine, near, self.tolerance)
+        if found is None:
+            return None
+        table = np.array(
+            [
+                self._line(0, fine, 1.0, 0.0),
+                *(self._line(k, x.at, x.speed, x.beyond) for k, x in enumerate(found, start=1)),
+            ]
+        )
+        residual = max(fine.residual, found.half.at.residual, found.quarter.at.residual)
+        return Matched(table, residual, found)
+
+    def _line(self, level: int, at: Equilibrium, speed: float, beyond: float) -> list[float]:
+        """Values and rates at a level; ``speed`` turns the unit tangent to a rate per s.
+
+        The values are those ``beyond`` before the state, where its plane is.
+        """
+        values = self.values(level, at)
         gamma_rate = speed * at.tangent.load
         moment_rate = speed * self.pieces[level].moment(at.moment_rate)
-        return gamma, moment, energy, gamma_rate, moment_rate, 4.0 * moment * gamma_rate
+        rates = (gamma_rate, moment_rate, 4.0 * values[MOMENT] * gamma_rate)
+        return [v - beyond * r for v, r in zip(values, rates, strict=True)] + list(rates)
 
-    def near(self, base: Equilibrium, s: float) -> Matched | None:
-        """The matched states at the distance ``s`` along the path of the finest mesh."""
+    def near(self, base: Equilibrium, s: float, here: Restricted | None = None) -> Matched | None:
+        """The matched states at the distance ``s`` along the path of the finest mesh.
+
+        ``here`` : those of the coarser meshes at ``base``, or near it, to start from.
+        """
         at = self.beside(base, s)
-        return None if at is None else self.matched(at)
+        return None if at is None else self.matched(at, here)
 
     def beside(self, base: Equilibrium, s: float) -> Equilibrium | None:
         """The state on the finest mesh at the distance ``s`` from another; None without one."""
@@ -103,26 +106,6 @@ class Family:
             tolerance=self.tolerance,
         )
         return at if at.converged else None
-
-
-def _normal(piece: Sector, q: Array, load: float) -> Direction:
-    """The direction of rates ``q`` (n, b) of the frames and ``load`` of gamma, as a normal.
-
-    Notes
-    -----
-    Its product with another direction is the trapezoidal rule for the integral of the product of
-    both rotations, the grips' included: they turn with gamma and are no entries of q. Without them
-    an end of the integral would be missing, and the series in h would have odd powers.
-    """
-    grips = float(np.sum(piece.body.mass[:, 0] * piece.held.turn**2))
-    return Direction(q, np.zeros(len(piece.held.target)), grips * load)
-
-
-def _coarser(state: State) -> State:
-    """Every second frame of a state."""
-    return state.but(
-        quat=np.ascontiguousarray(state.quat[::2]), stretch=np.ascontiguousarray(state.stretch[::2])
-    )
 
 
 def romberg(levels: Array) -> Array:
@@ -178,12 +161,20 @@ def _goal(visit: Visit, asked: Collection[float]) -> Goal | None:
     return None
 
 
-def placed(family: Family, visit: Visit, asked: Collection[float]) -> Place | None:
-    """Where a visited state belongs on the extrapolated curve; None where a level has no state."""
-    here = family.matched(visit.at)
+def placed(
+    family: Family, visits: Sequence[Visit], asked: Collection[float]
+) -> Iterator[Place | None]:
+    """Where visited states belong on the extrapolated curve; None where a level has no state."""
+    near = None
+    for visit in visits:
+        here = family.matched(visit.at, near)
+        yield None if here is None else _placed(family, visit, here, asked)
+        near = None if here is None else here.coarse
+
+
+def _placed(family: Family, visit: Visit, here: Matched, asked: Collection[float]) -> Place | None:
+    """Where a visited state belongs, ``here`` being matched to it."""
     goal = _goal(visit, asked)
-    if here is None:
-        return None
     if goal is not None:
         return _sought(family, visit.at, here, goal)
     values, bend = romberg(here.table)[-1][:RATE], np.zeros((LEVELS, RATE))
@@ -200,7 +191,7 @@ def _sought(family: Family, base: Equilibrium, here: Matched, goal: Goal) -> Pla
         if slope and abs(step) <= _SMALL:
             return _found(goal, s + step, _advanced(here, step, bend), slope, bend)
         s += step
-        new = family.near(base, s) if abs(s) < FARTHEST else None
+        new = family.near(base, s, here.coarse) if abs(s) < FARTHEST else None
         if new is None:
             return None
         bend = (new.table[:, RATE:] - here.table[:, RATE:]) / step

@@ -50,7 +50,7 @@ def all_asked(
     line = dict(enumerate(zip(lengths, visits, strict=True)))
     folds = [k for k, one in enumerate(visits) if one.kind == "fold"]
     for before, k, after in zip([-1, *folds], folds, [*folds[1:], len(visits)], strict=False):
-        place = placed(family, visits[k], asked)
+        (place,) = placed(family, [visits[k]], asked)
         if place is None:
             continue
         bend = float(romberg(place.bend[:, GAMMA])[-1])
@@ -81,5 +81,6 @@ def _reached(
         at = family.beside(fold.at, s) if abs(s) < FARTHEST else None
         if at is not None:
             found = visit(family.pieces[0], wanted, at, sought=(load, side * bend))
-            if placed(family, found, ()) is not None:
+            (there,) = placed(family, [found], ())
+            if there is not None:
                 yield s, found

@@ -68,7 +68,7 @@ def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
         here = found[-1]
         if ended:
             return
-        ease = math.sqrt(_ANGLE / max(angle, 1e-3))
+        ease = math.sqrt(wanted.stride * _ANGLE / max(angle, 1e-3))
         if step.end.iterations > 4:
             ease = min(ease, 0.7)
         length = min(step.length * min(max(ease, 0.5), 2.0), LARGEST_STEP)

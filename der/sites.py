@@ -13,6 +13,7 @@ the coarsest of the numbers n, n/2, n/4, ... that has two for each segment, and 
 from __future__ import annotations
 
 import heapq
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -61,7 +62,7 @@ def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
     joints = [begin, *(s for s in ring.breaks if begin + margin < s < end - margin), end]
     if n_cells < len(joints) - 1:
         joints = [begin, end]
-    segments = [_Segment(ring, a, b) for a, b in pairwise(joints)]
+    segments = [_segment(ring, a, b) for a, b in pairwise(joints)]
     # a straight that rounding leaves between two fillets deserves no cell of its own
     least = FEW * sum(segment.weight for segment in segments) / n_cells
     if any(segment.weight < least for segment in segments):
@@ -69,7 +70,7 @@ def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
         if segments[-1].weight < least:
             kept = kept[:-1]
         joints = [begin, *kept, end]
-        segments = [_Segment(ring, a, b) for a, b in pairwise(joints)]
+        segments = [_segment(ring, a, b) for a, b in pairwise(joints)]
     coarsest = n_cells
     while coarsest % 2 == 0 and coarsest // 2 >= 2 * len(segments):
         coarsest //= 2
@@ -102,6 +103,12 @@ class _Segment:
         if self.even:
             return np.linspace(self.s[0], self.s[-1], count + 1)
         return np.interp(np.linspace(0.0, self.weight, count + 1), self.share, self.s)
+
+
+@lru_cache(maxsize=64)
+def _segment(ring: Ring, begin: float, end: float) -> _Segment:
+    """A segment, remembered: the meshes of a ring's error bars share it."""
+    return _Segment(ring, begin, end)
 
 
 def _shared(weights: list[float], total: int) -> list[int]:

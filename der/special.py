@@ -58,6 +58,8 @@ class Wanted:
     load_max: float = math.pi
     until_folded: bool = False
     targets: tuple[float, ...] | None = None  # loads at which to solve; None: multiples of pi/8
+    limits: bool = True
+    stride: float = 1.0  # by how much the path may turn further than usual from state to state
     stability: bool = True
     contacts: bool = True
     tolerance: float = 1e-10
@@ -110,8 +112,9 @@ def special_points(
     end = marks[-1].s
     marks += [_Mark(s, Visit(at, "fold")) for s, at in folds if s < end]
     line = sorted([_Mark(0.0, here), *marks], key=lambda m: m.s)
-    line += _limits(step, line)
-    line.sort(key=lambda m: m.s)
+    if wanted.limits:
+        line += _limits(step, line)
+        line.sort(key=lambda m: m.s)
     if wanted.contacts:
         line = _passages(piece, wanted, step, line, ended)
     if wanted.stability:  # the index at contacts is a sample, too

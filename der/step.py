@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from der.chords import chord, end_rates, onward
 from der.equilibrium import (
     ADVICE,
     Control,
@@ -22,7 +23,7 @@ from der.equilibrium import (
     equilibrium,
     moved,
 )
-from der.frames import Array, chart_rate, rotation_vector
+from der.frames import Array, rotation_vector
 from der.rod import State
 from der.sector import Sector
 
@@ -57,22 +58,15 @@ class Step:
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
-        jump = self.between(a.state, b.state)
+        jump, t = self.between(a.state, b.state), b.tangent
         # d/ds at the end, where s is measured along the tangent at the start, and in its frames
-        q = b.tangent.q.copy()
-        q[:, :3] = chart_rate(jump.q[:, :3], q)
-        t = b.tangent._replace(q=q)
-        rate = 1.0 / dot(self.piece.body, a.tangent, t)
+        q, rate = end_rates(self.piece.body.mass, jump.q, a.tangent.q, a.tangent.load, t.q, t.load)
         object.__setattr__(self, "jump", jump)
-        object.__setattr__(self, "end_rate", Direction(t.q * rate, t.force * rate, t.load * rate))
+        object.__setattr__(self, "end_rate", Direction(q, t.force * rate, t.load * rate))
 
     def between(self, a: State, b: State) -> Direction:
         """The increment that leads from one state to another."""
-        q = np.empty_like(self.start.tangent.q)
-        q[:, :3] = rotation_vector(a.quat, b.quat)
-        if q.shape[1] == 4:
-            q[:, 3] = b.stretch - a.stretch
-        q[~self.piece.held.free] = 0.0
+        q = chord(self.piece.held.free, a.quat, a.stretch, b.quat, b.stretch)
         return Direction(q, b.force - a.force, b.load - a.load)
 
     @cached_property
@@ -101,16 +95,12 @@ class Step:
 
         The cubic through both states and tangents, in the frames of the end.
         """
-        body, t, jump = self.piece.body, self.end.tangent, self.jump
-        rate = self.start.tangent.q.copy()
-        rate[:, :3] = chart_rate(-jump.q[:, :3], rate)
-        start = self.start.tangent._replace(q=rate)
-        length = dot(body, t, jump)
-        u = s / length
-        of_start = s * u * (1.0 + u) / dot(body, t, start)
-        of_end, of_jump = s * (1.0 + u) ** 2, -u * u * (3.0 + 2.0 * u)
+        start, t, jump = self.start.tangent, self.end.tangent, self.jump
+        q, of_end, of_start, of_jump = onward(
+            self.piece.body.mass, s, jump.q, jump.load, start.q, start.load, t.q, t.load
+        )
         return Direction(
-            of_end * t.q + of_start * start.q + of_jump * jump.q,
+            q,
             of_end * t.force + of_start * start.force + of_jump * jump.force,
             of_end * t.load + of_start * start.load + of_jump * jump.load,
         )

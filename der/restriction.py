@@ -1,0 +1,146 @@
+"""The states of two coarser meshes that belong to one on the finest.
+
+Frames sit on the same material points at every resolution, so every second frame of a state is
+nearly a state on half the edges. What is missing is called its *offset*. Offsets change little from
+one state of a path to the next, and are about four times as large from mesh to mesh: Newton's
+method starts from the offset expected, which bare frames are sometimes too far from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from der.chords import chord
+from der.equilibrium import Control, Direction, Equilibrium, dot, equilibrium, moved
+from der.frames import Array
+from der.rod import State
+from der.sector import Sector
+
+
+class Level(NamedTuple):
+    """The state of a coarser mesh that belongs to one on a mesh of twice the edges."""
+
+    at: Equilibrium
+    offset: Direction  # what leads to it from every second frame
+    speed: float  # lengths along its own tangent, per length of the path of the finest mesh
+    beyond: float  # how far beyond the plane it lies, along that path
+
+
+class Restricted(NamedTuple):
+    """What belongs to a state on half and on a quarter of its edges."""
+
+    half: Level
+    quarter: Level
+
+
+def restricted(
+    pieces: Sequence[Sector],
+    fine: Equilibrium,
+    near: Restricted | None,
+    tolerance: float,
+) -> Restricted | None:
+    """The states of two coarser meshes in the planes normal to the path at a state on the finest.
+
+    Parameters
+    ----------
+    pieces : the sector on N, N/2 and N/4 edges.
+    near : the same of a state nearby; None: not known.
+    tolerance : of the residual of an equilibrium, GJ/a.
+
+    Returns
+    -------
+    Restricted or None
+        None where a level has no such state.
+    """
+    finest, on_half, on_quarter = pieces
+    q, load = fine.tangent.q, fine.tangent.load
+    advance = dot(finest.body, _normal(finest, q, load), fine.tangent)
+    q = np.ascontiguousarray(q[::2])
+    expected = None if near is None else near.half.offset
+    half = _level(on_half, fine.state, q, load, expected, advance, 0.0, tolerance)
+    if half is None:
+        return None
+    # second order: four times that of the finer mesh; and what that was short of nearby
+    offset = _coarser(half.offset, 4.0)
+    if near is not None:
+        less = _coarser(near.half.offset, 4.0)
+        offset = _sum(_sum(offset, near.quarter.offset, 1.0), less, -1.0)
+    offset.q[~on_quarter.held.free] = 0.0
+    q = np.ascontiguousarray(q[::2])
+    quarter = _level(on_quarter, half.at.state, q, load, offset, advance, half.beyond, tolerance)
+    return None if quarter is None else Restricted(half, quarter)
+
+
+def _level(
+    piece: Sector,
+    finer: State,
+    q: Array,
+    load: float,
+    expected: Direction | None,
+    advance: float,
+    beyond: float,
+    tolerance: float,
+) -> Level | None:
+    """The state of ``piece`` in the plane normal to rates ``q`` (n, b) and ``load``.
+
+    Tried from the offset ``expected``, then from bare frames. ``beyond`` is that of the finer mesh.
+    """
+    own = finer.but(
+        quat=np.ascontiguousarray(finer.quat[::2]),
+        stretch=np.ascontiguousarray(finer.stretch[::2]),
+    )
+    row = _normal(piece, q, load)
+    starts = [own]
+    if expected is not None:
+        rates = Direction(q, np.zeros(len(own.force)), load)
+        # offsets of another state may lie beside this plane by a little
+        away = dot(piece.body, row, expected) / dot(piece.body, row, rates)
+        starts.insert(0, moved(piece.held, own, _sum(expected, rates, -away)))
+    for start in starts:
+        at = equilibrium(
+            piece.body,
+            piece.held,
+            start,
+            along=row,
+            control=Control.DIRECTION,
+            tolerance=tolerance,
+        )
+        if at.converged and (speed := dot(piece.body, row, at.tangent)) != 0.0:
+            break
+    else:
+        return None
+    offset = Direction(
+        chord(piece.held.free, own.quat, own.stretch, at.state.quat, at.state.stretch),
+        at.state.force - own.force,
+        at.state.load - own.load,
+    )
+    # corrections are orthogonal one by one, and rotations do not commute: a state lies beside the
+    # plane to the second order of its offset, by as much as its start would have it
+    beyond += dot(piece.body, row, offset) / advance
+    return Level(at, offset, advance / speed, beyond)
+
+
+def _normal(piece: Sector, q: Array, load: float) -> Direction:
+    """The direction of rates ``q`` (n, b) of the frames and ``load`` of gamma, as a normal.
+
+    Notes
+    -----
+    Its product with another direction is the trapezoidal rule for the integral of the product of
+    both rotations, the grips' included: they turn with gamma and are no entries of q. Without them
+    an end of the integral would be missing, and the series in h would have odd powers.
+    """
+    grips = float(piece.body.mass[:, 0] @ piece.held.turn**2)
+    return Direction(q, np.zeros(len(piece.held.target)), grips * load)
+
+
+def _coarser(offset: Direction, factor: float) -> Direction:
+    """Every second of an offset, times a factor."""
+    return Direction(factor * offset.q[::2], factor * offset.force, factor * offset.load)
+
+
+def _sum(a: Direction, b: Direction, factor: float) -> Direction:
+    """The sum a + factor b."""
+    return Direction(a.q + factor * b.q, a.force + factor * b.force, a.load + factor * b.load)
