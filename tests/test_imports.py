@@ -47,6 +47,7 @@ ROOMS = {
         "sector",
         "equilibrium",
         "step",
+        "passages",
         "branches",
         "special",
         "path",
