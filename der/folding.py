@@ -16,6 +16,7 @@ from der.assembly import assemble
 from der.checks import counts, shown
 from der.equilibrium import equilibrium
 from der.frames import Array
+from der.passages import gap, nearest_strands
 from der.path import follow
 from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode
 from der.ring import circle
@@ -240,6 +241,9 @@ def _load_kernels(stability: bool, contacts: bool, *, snaps: bool) -> None:
         relax(piece.body, piece.held, piece.start)
     for _ in follow(piece, Wanted(load_max=0.1, stability=stability, contacts=contacts), Tally()):
         pass
+    if contacts:
+        x, _ = piece.shape(piece.start)
+        gap(x, *nearest_strands(x, x))
 
 
 def _entries(

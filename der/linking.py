@@ -30,61 +30,84 @@ def twist(quat):
 def writhe(x, copies):
     """Writhe of the closed polygon with vertices ``x`` (n, 3): Klenin & Langowski 2000, method 1a.
 
-    Edge j ends at vertex j. Of a polygon made of ``copies`` half-turn images, one sector's edges
-    are paired with all; the edges in its two planes of symmetry belong to it by half.
+    Edge j ends at vertex j. Of a polygon made of ``copies`` half-turn images one sector's edges,
+    i and k, are paired with each other and with all their images, each pair once: for k from i on
+    the images of k are two runs of edges, i .. n/2 - i and n/2 + i .. n - i of four copies, one,
+    i .. n - i, of two. The edges in a sector's two planes of symmetry belong to it by half.
     """
     n = x.shape[0]
     last = n // copies if copies > 1 else n - 1
     total = 0.0
     for i in range(last + 1):
         share = 0.5 if copies > 1 and (i == 0 or i == last) else 1.0
-        total += share * _solid_angles(x, i)
+        before = n - 2 if i == 0 else n - 1  # the last edge that is not next to i
+        for run in range(5):  # with the images of edges beyond i, and with those of i itself
+            first, end, weight = 0, -1, 2.0 * share if run < 2 else share * share
+            if run == 0:
+                first = i + 2
+                end = before if copies == 1 else (n if copies == 2 else n // 2) - i - 1
+            elif run == 1 and copies == 4:
+                first, end = n // 2 + i + 1, n - i - 1
+            elif run == 2 and copies == 4:
+                first = end = n // 2 + i
+            elif run == 3 and copies == 4 and i < last:
+                first = end = n // 2 - i
+            elif run == 4 and i > 0 and (copies == 4 or (copies == 2 and i < last)):
+                first = end = n - i
+            total += weight * _solid_angles(x, i, first, min(end, before))
     return copies * total / (4.0 * np.pi)
 
 
-@njit(cache=True)
-def _solid_angles(x, i):
-    """Sum of the signed areas, on the sphere, of the directions from edge ``i`` to other edges.
+@njit(cache=True, inline="always")
+def _solid_angles(x, i, first, last):
+    """Sum of the signed areas, on the sphere, of the directions from edge ``i`` to a run of edges.
 
-    The directions to an edge make a quadrilateral a, b, c, d; its two triangles (Van Oosterom &
-    Strackee 1983) are arguments of complex numbers, added by multiplying these. The area is below
-    2 pi, so half of it never leaves the principal branch. Edge k + 1 takes over two corners of k.
-    Where an edge all but touches another, corners lie opposite each other and the complex numbers
-    all but vanish: there `_quadrilateral` keeps the digits.
+    None of the edges ``first`` .. ``last`` may be next to i. With p, p' and q, q' the directions
+    from the start and the end of edge i to the ends of another, the area is the quadrilateral
+    p, p', q', q; the two triangles (Van Oosterom & Strackee 1983) that it is cut into along p q'
+    have one triple product. They are arguments of complex numbers, added by multiplying these, up
+    to four quadrilaterals that are small. The area is below 2 pi, so half of it never leaves the
+    principal branch. Where an edge all but touches another, corners lie opposite each other and the
+    complex numbers all but vanish: there `_quadrilateral` keeps the digits.
     """
-    n = x.shape[0]
-    start = i - 1 if i > 0 else n - 1
-    k = i + 1 if i + 1 < n else 0  # the vertex where the first edge not next to i begins
-    ax, ay, az = x[k, 0] - x[start, 0], x[k, 1] - x[start, 1], x[k, 2] - x[start, 2]
-    dx, dy, dz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-    a = np.sqrt(ax * ax + ay * ay + az * az)
-    d = np.sqrt(dx * dx + dy * dy + dz * dz)
-    da = dx * ax + dy * ay + dz * az
-    total = 0.0
-    for _ in range(n - 3):
-        first = k
-        k = k + 1 if k + 1 < n else 0
-        bx, by, bz = x[k, 0] - x[start, 0], x[k, 1] - x[start, 1], x[k, 2] - x[start, 2]
-        cx, cy, cz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-        b = np.sqrt(bx * bx + by * by + bz * bz)
-        c = np.sqrt(cx * cx + cy * cy + cz * cz)
-        ca = cx * ax + cy * ay + cz * az
-        bc = bx * cx + by * cy + bz * cz
-        # a . (b x c) and a . (c x d)
-        ux, uy, uz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax  # c x a
-        abc = ux * bx + uy * by + uz * bz
-        acd = -(ux * dx + uy * dy + uz * dz)
-        r1 = (a * b + ax * bx + ay * by + az * bz) * c + bc * a + ca * b
-        r2 = (a * c + ca) * d + (cx * dx + cy * dy + cz * dz) * a + da * c
-        sine, cosine = abc * r2 + acd * r1, r1 * r2 - abc * acd
-        if abs(sine) + abs(cosine) > _THIN * a * a * b * c * c * d:
-            total -= 2.0 * np.arctan2(sine, cosine)
+    if last < first:
+        return 0.0
+    start = i - 1 if i > 0 else x.shape[0] - 1
+    k = first - 1  # the vertex where the first edge begins
+    ex, ey, ez = x[i, 0] - x[start, 0], x[i, 1] - x[start, 1], x[i, 2] - x[start, 2]
+    px, py, pz = x[k, 0] - x[start, 0], x[k, 1] - x[start, 1], x[k, 2] - x[start, 2]
+    qx, qy, qz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    p = np.sqrt(px * px + py * py + pz * pz)
+    q = np.sqrt(qx * qx + qy * qy + qz * qz)
+    pq = px * qx + py * qy + pz * qz
+    total, real, imaginary, count = 0.0, 1.0, 0.0, 0
+    for _ in range(last - first + 1):
+        k += 1
+        ux, uy, uz = x[k, 0] - x[start, 0], x[k, 1] - x[start, 1], x[k, 2] - x[start, 2]  # p'
+        vx, vy, vz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]  # q'
+        u = np.sqrt(ux * ux + uy * uy + uz * uz)
+        v = np.sqrt(vx * vx + vy * vy + vz * vz)
+        uv = ux * vx + uy * vy + uz * vz
+        pv = px * vx + py * vy + pz * vz
+        # p . (p' x q') = p . (q' x q) = e . (q' x q)
+        triple = ex * (vy * qz - vz * qy) + ey * (vz * qx - vx * qz) + ez * (vx * qy - vy * qx)
+        r1 = (p * u + px * ux + py * uy + pz * uz) * v + uv * p + pv * u
+        r2 = (p * v + pv) * q + (vx * qx + vy * qy + vz * qz) * p + pq * v
+        a, b = r1 * r2 - triple * triple, triple * (r1 + r2)
+        if count == 4 or not a > 2.0 * abs(b):
+            total += np.arctan2(imaginary, real)
+            real, imaginary, count = 1.0, 0.0, 0
+        if a > 2.0 * abs(b):
+            real, imaginary = real * a - imaginary * b, real * b + imaginary * a
+            count += 1
+        elif abs(a) + abs(b) > _THIN * p * p * u * v * v * q:
+            total += np.arctan2(b, a)
         else:
-            total -= _quadrilateral(x[start], x[i], x[first], x[k])
-        ax, ay, az, a = bx, by, bz, b
-        dx, dy, dz, d = cx, cy, cz, c
-        da = bc
-    return total
+            total += 0.5 * _quadrilateral(x[start], x[i], x[k - 1], x[k])
+        px, py, pz, p = ux, uy, uz, u
+        qx, qy, qz, q = vx, vy, vz, v
+        pq = uv
+    return -2.0 * (total + np.arctan2(imaginary, real))
 
 
 @njit(cache=True)

@@ -20,6 +20,7 @@ The clamped grips join the arms through the grip distance alone. Hence the modes
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ from der.rod import Rod, State, rod
 from der.scene import COPIES, sector_name
 from der.sections import Section
 from der.sites import sites
-from der.stability import SymmetryClass
+from der.stability import Stack, SymmetryClass, stack
 from der.supports import Supports, supports
 
 E1, E2, E3 = np.eye(3)
@@ -48,6 +49,11 @@ class Sector:
     start: State  # the flat ring, gamma = 0
     classes: dict[str, tuple[int, SymmetryClass]]  # label -> (multiplicity, modes)
     arc_length: Array  # (n,) of the frames along the ring
+
+    @cached_property
+    def modes(self) -> Stack:
+        """The modes of all classes."""
+        return stack([modes for _, modes in self.classes.values()])
 
     def moment(self, generalised: float) -> float:
         """M of one arm, from dL/dgamma of the piece: M = (1/4) dU/dgamma of the full ring."""

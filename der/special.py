@@ -17,13 +17,15 @@ import numpy as np
 
 from der.branches import SAME, Change, Place, beside_folds, changes, is_fold, merged, own_changes
 from der.equilibrium import Equilibrium
+from der.passages import passage
 from der.rod import strains
 from der.sector import Sector
-from der.stability import index_and_stiffness
+from der.stability import indices_and_stiffness, stack
 from der.step import ROOT, Step
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
-_CONTACT = 1e-4  # of s, for the passage of a strand: an ideal ring asks for no more
+_CONTACT = 1e-5  # of s, for the passage of a strand: places are found to 2e-6
+_SIDE = 0.45  # of that: how far before and behind a passage the link is counted
 _BRIEF = 1e-3  # of s, between a passage and its reversal
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 # of the softest torsion of a ring, GJ (2 pi/L)^2: within a step a mode's stiffness was seen to
@@ -70,13 +72,7 @@ def visit(piece: Sector, wanted: Wanted, at: Equilibrium, **extra: object) -> Vi
     """A visit with what is wanted of a regular state."""
     if not wanted.stability:
         return Visit(at, **extra)  # type: ignore[arg-type]
-    known, stiffness = zip(
-        *(
-            index_and_stiffness(piece.body, piece.held, modes, at.state)
-            for _, modes in piece.classes.values()
-        ),
-        strict=True,
-    )
+    known, stiffness = indices_and_stiffness(piece.body, piece.held, piece.modes, at.state)
     return Visit(at, index=known, stiffness=stiffness, **extra)  # type: ignore[arg-type]
 
 
@@ -128,10 +124,33 @@ def _folds(step: Step) -> list[tuple[float, Equilibrium]]:
     cuts = [0.0, *_slowest(step.length, step.jump.load, *rates), step.length]
     places = [(s, step.at(s)) for s in cuts]
     return [
-        step.change(lambda at: at.tangent.load, low, high)
+        _turn(step, low, high, lambda at: at.state.load, lambda at: at.tangent.load)
         for low, high in pairwise(_cut(step, places, lambda at: (at.state.load, at.tangent.load)))
         if low[1].tangent.load * high[1].tangent.load < 0.0
     ]
+
+
+def _turn(
+    step: Step,
+    low: tuple[float, Equilibrium],
+    high: tuple[float, Equilibrium],
+    value: Callable[[Equilibrium], float],
+    rate: Callable[[Equilibrium], float],
+) -> tuple[float, Equilibrium]:
+    """The place between two, and its state, where a ``value`` turns: its ``rate`` changes sign."""
+    (s, a), (t, b) = low, high
+    c1, c2, c3 = _cubic(t - s, value(b) - value(a), rate(a), rate(b))
+    # the root of c1 + 2 c2 u + 3 c3 u^2 between 0 and 1, where that changes its sign
+    u = -c1 / (c2 + math.copysign(math.sqrt(max(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
+    if not 0.0 < u < 1.0 and c3 != 0.0 and u != 0.0:
+        u = c1 / (3.0 * c3 * u)
+    return step.change(rate, low, high, s + u * (t - s) if 0.0 < u < 1.0 else None)
+
+
+def _cubic(length: float, jump: float, first: float, last: float) -> tuple[float, float, float]:
+    """Coefficients of u, u^2, u^3 of the cubic by its rates at u = 0 and 1, over its ``length``."""
+    mean = jump / length
+    return first, 3.0 * mean - 2.0 * first - last, first + last - 2.0 * mean
 
 
 def _slowest(length: float, jump: float, first: float, last: float) -> list[float]:
@@ -141,8 +160,7 @@ def _slowest(length: float, jump: float, first: float, last: float) -> list[floa
     """
     if first * last <= 0.0 or length <= 0.0:  # two marks in one place
         return []
-    c2 = 3.0 * jump / length - 2.0 * first - last
-    c3 = first + last - 2.0 * jump / length
+    _, c2, c3 = _cubic(length, jump, first, last)
     u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
     if not 0.0 < u < 1.0:
         return []
@@ -236,7 +254,7 @@ def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
         places = [(a.s, first), *middle, (b.s, last)]
         for low, high in pairwise(_cut(step, places, lambda at: (at.moment, at.moment_rate))):
             if low[1].moment_rate * high[1].moment_rate < 0.0:
-                s, at = step.change(lambda at: at.moment_rate, low, high)
+                s, at = _turn(step, low, high, lambda at: at.moment, lambda at: at.moment_rate)
                 found.append(_Mark(s, Visit(at, "limit")))
     return found
 
@@ -292,11 +310,13 @@ def _between_equals(piece: Sector, step: Step, c: int, a: _Mark, b: _Mark) -> li
     if len(ends) < 2 or min(map(abs, ends)) > soft:
         return []
     _, modes = list(piece.classes.values())[c]
+    own = stack([modes])
     there = (a.visit.index or ())[c]
 
     def seen(u: float) -> tuple[Place, float]:
         s = a.s + u * (b.s - a.s)
-        count, stiffness = index_and_stiffness(piece.body, piece.held, modes, step.at(s).state)
+        state = step.at(s).state
+        (count,), (stiffness,) = indices_and_stiffness(piece.body, piece.held, own, state)
         return (s, count), stiffness
 
     place, stiffness = seen(0.5)
@@ -338,9 +358,15 @@ def _with_sides(piece: Sector, wanted: Wanted, step: Step, marks: list[_Mark]) -
             groups[-1].append(m)
         else:
             groups.append([m])
-    for group in groups:
+    while groups:
+        group = groups.pop(0)
         places = [step.at(s) for s in _beside(step, group, singular, line[-1].s)]
         before, after = (visit(piece, wanted, at).index for at in places)
+        near = groups and groups[0][0].s - group[-1].s < 2.0 * _FLANK * step.length
+        if near and None in (after or ()):
+            # the index midway to the next is uncertain: they share what changes over both
+            groups[0] = group + groups[0]
+            continue
         sides = _shared(places[0], group, before, after)
         for m, pair in zip(group, sides, strict=True):
             sided[id(m)] = replace(m, visit=replace(m.visit, sides=pair))
@@ -406,8 +432,10 @@ def _contacts(
     step: Step,
     low: tuple[float, int | None],
     high: tuple[float, int | None],
+    *,
+    halve: bool = False,
 ) -> list[_Mark]:
-    """Where the link changes between two places, by bisection."""
+    """Where the link changes between two places: at passages, else by bisection (``halve``)."""
     if low[1] == high[1]:
         return []
     if high[0] - low[0] < _CONTACT:
@@ -415,9 +443,16 @@ def _contacts(
         at = step.at(low[0])
         found = visit(piece, wanted, at, kind="contact", link=high[1], details=change)
         return [_Mark(low[0], found)]
-    s = 0.5 * (low[0] + high[0])
-    middle = (s, piece.link(step.near(s)))
+    passed = None if halve else passage(step, low[0], high[0])
+    if passed is None:
+        s = 0.5 * (low[0] + high[0])
+        inside = [(s, piece.link(step.near(s)))]
+    else:
+        sides = passed - _SIDE * _CONTACT, passed + _SIDE * _CONTACT
+        inside = [(s, piece.link(step.at(s).state)) for s in sides if low[0] < s < high[0]]
+    # what changes beside a passage that was looked at is bisected: it was none, or not the only one
     return [
-        *_contacts(piece, wanted, step, low, middle),
-        *_contacts(piece, wanted, step, middle, high),
+        one
+        for ends in pairwise([low, *inside, high])
+        for one in _contacts(piece, wanted, step, *ends, halve=passed is not None)
     ]

@@ -8,6 +8,7 @@ them, and each class is a problem on the sector with conditions of its own (`Sym
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,30 +36,48 @@ class SymmetryClass(NamedTuple):
     axis: Array  # (n_c, 3)
 
 
-@njit(cache=True)
-def _class_matrix(rod, held, modes, quat, stretch, force, load):
+class Stack(NamedTuple):
+    """Several classes, for a kernel that assembles the matrix of a state once for all of them."""
+
+    free: NDArray[np.bool_]  # (k, n, b)
+    weight: Array  # (k, m, n), of the class with most conditions; the rest are padding
+    axis: Array  # (k, m, 3)
+    conditions: NDArray[np.int64]  # (k,) how many each class has
+
+
+def stack(classes: Sequence[SymmetryClass]) -> Stack:
+    """Some classes of one sector, one behind another."""
+    sizes = [len(modes.axis) for modes in classes]
+    n, m = classes[0].free.shape[0], max(sizes)
+    weight, axis = np.zeros((len(sizes), m, n)), np.zeros((len(sizes), m, 3))
+    for k, (modes, size) in enumerate(zip(classes, sizes, strict=True)):
+        weight[k, :size], axis[k, :size] = modes.weight, modes.axis
+    return Stack(np.array([modes.free for modes in classes]), weight, axis, np.array(sizes))
+
+
+@njit(cache=True, inline="always")
+def _class_matrix(rod, held, system, free, weight, axis, quat, stretch, load):
     """Blocks and border of the Hessian at a state of ``held``, for the modes of one class."""
-    system = assemble(rod, held, quat, stretch, force, load)
     n, b = held.free.shape
-    n_c = modes.axis.shape[0]
+    n_c = axis.shape[0]
     border = np.zeros((n, b, n_c))
     strain = lengthened(rod, held, stretch, load)
-    position_rows(rod.length, modes.weight, modes.axis, quat, strain, np.zeros(n_c), border)
-    return take_out(modes.free, system.diag, system.off, border)
+    position_rows(rod.length, weight, axis, quat, strain, np.zeros(n_c), border)
+    return take_out(free, system.diag, system.off, border)
 
 
-@njit(cache=True)
-def _stiffness(rod, modes, factors):
+@njit(cache=True, inline="always")
+def _stiffness(rod, free, factors):
     """Estimate of the eigenvalue nearest to zero: the Rayleigh quotient of one inverse iteration.
 
     It is good where that eigenvalue stands apart from the rest, as one close to zero does.
     """
-    n, b = modes.free.shape
+    n, b = free.shape
     M = factors.schur.shape[0]
     start, x = np.zeros((n, b, 1)), np.zeros((n, b, 1))
     for j in range(n):  # neither smooth nor of any symmetry
         for i in range(b):
-            if modes.free[j, i]:
+            if free[j, i]:
                 start[j, i, 0] = 0.5 + ((j * b + i) * 0.6180339887498949) % 1.0
                 x[j, i, 0] = rod.length[j] * start[j, i, 0]
     solve_band(factors.inverse, factors.lower, x)
@@ -72,7 +91,7 @@ def _stiffness(rod, modes, factors):
     top, bottom = 0.0, 0.0
     for j in range(n):
         for i in range(b):
-            if modes.free[j, i]:
+            if free[j, i]:
                 s = x[j, i, 0]
                 for p in range(M):
                     s -= factors.lifted[j, i, p] * y[p, 0]
@@ -82,18 +101,31 @@ def _stiffness(rod, modes, factors):
 
 
 @njit(cache=True)
-def _count(rod, held, modes, quat, stretch, force, load, shift, looks):
-    """Index, how safe it is, and (where ``looks``) the stiffness of the softest mode."""
-    diag, off, border = _class_matrix(rod, held, modes, quat, stretch, force, load)
+def _counts(rod, held, classes, quat, stretch, force, load, shift, looks):
+    """Index, how safe it is, and (where ``looks``) the stiffness of the softest mode, (k,) each."""
+    k = classes.free.shape[0]
     n, b = held.free.shape
-    if shift != 0.0:
-        for j in range(n):
-            for i in range(b):
-                diag[j, i, i] += shift * rod.length[j]
-    factors = factor(diag, off, border)
-    negative, margin = inertia(factors)
-    stiffness = _stiffness(rod, modes, factors) if looks and negative >= 0 else 0.0
-    return negative - modes.axis.shape[0], margin, stiffness
+    negative, margin = np.empty(k, dtype=np.int64), np.empty(k)
+    stiffness = np.zeros(k)
+    system = assemble(rod, held, quat, stretch, force, load)
+    for c in range(k):
+        m = classes.conditions[c]
+        # copies: what they are slices of need not be contiguous, and one kind is compiled
+        weight, axis = classes.weight[c, :m].copy(), classes.axis[c, :m].copy()
+        free = classes.free[c].copy()
+        diag, off, border = _class_matrix(
+            rod, held, system, free, weight, axis, quat, stretch, load
+        )
+        if shift != 0.0:
+            for j in range(n):
+                for i in range(b):
+                    diag[j, i, i] += shift * rod.length[j]
+        factors = factor(diag, off, border)
+        count, margin[c] = inertia(factors)
+        negative[c] = count - m
+        if looks and count >= 0:
+            stiffness[c] = _stiffness(rod, free, factors)
+    return negative, margin, stiffness
 
 
 def index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int | None:
@@ -102,36 +134,41 @@ def index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int 
     A state of ``held`` at which the smallest pivot is tiny is factored again with a shift of
     either sign: equal counts certify the index, unequal ones make it None.
     """
-    return _certified(body, held, modes, state, looks=False)[0]
+    check_cut(body, modes.free)
+    return _certified(body, held, stack([modes]), state, looks=False)[0][0]
 
 
-def index_and_stiffness(
-    body: Rod, held: Supports, modes: SymmetryClass, state: State
-) -> tuple[int | None, float]:
-    """`index`, and about how stiff the softest mode of the class is [GJ/a^2], with its sign.
+def indices_and_stiffness(
+    body: Rod, held: Supports, classes: Stack, state: State
+) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
+    """`index` of each class, and about how stiff its softest mode is [GJ/a^2], with its sign.
 
     The stiffness is that of `softest_modes`, estimated at little cost: good where it is small.
     """
-    return _certified(body, held, modes, state, looks=True)
+    for free in classes.free:
+        check_cut(body, free)
+    return _certified(body, held, classes, state, looks=True)
 
 
 def _certified(
-    body: Rod, held: Supports, modes: SymmetryClass, state: State, *, looks: bool
-) -> tuple[int | None, float]:
-    check_cut(body, modes.free)
-    at = (body, held, modes, state.quat, state.stretch, state.force, state.load)
-    negative, margin, stiffness = _count(*at, 0.0, looks)
-    if negative >= 0 and margin > _SAFE:
-        return int(negative), stiffness
-    shift = _SHIFT * float(body.stiffness.max())
-    below, above = (_count(*at, s, False)[0] for s in (-shift, shift))
-    return (int(below) if below == above >= 0 else None), stiffness
+    body: Rod, held: Supports, classes: Stack, state: State, *, looks: bool
+) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
+    at = (body, held, classes, state.quat, state.stretch, state.force, state.load)
+    negative, margin, stiffness = _counts(*at, 0.0, looks)
+    counts: list[int | None] = negative.tolist()
+    doubtful = ~((negative >= 0) & (margin > _SAFE))
+    if doubtful.any():
+        shift = _SHIFT * float(body.stiffness.max())
+        below, above = (_counts(*at, s, False)[0] for s in (-shift, shift))
+        for c in np.flatnonzero(doubtful):
+            counts[c] = int(below[c]) if below[c] == above[c] >= 0 else None
+    return tuple(counts), tuple(stiffness.tolist())
 
 
 def raw_index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int:
     """The index by the signs of the pivots alone, as a bisection for its changes needs it."""
-    at = (body, held, modes, state.quat, state.stretch, state.force, state.load)
-    return int(_count(*at, 0.0, False)[0])
+    at = (body, held, stack([modes]), state.quat, state.stretch, state.force, state.load)
+    return int(_counts(*at, 0.0, False)[0][0])
 
 
 def all_modes(held: Supports) -> SymmetryClass:
@@ -142,7 +179,10 @@ def all_modes(held: Supports) -> SymmetryClass:
 @njit(cache=True)
 def _solve_class(rod, held, modes, quat, stretch, force, load, x):
     """Replace ``x`` (n, b, r) by the displacements under it as forces, on the conditions."""
-    diag, off, border = _class_matrix(rod, held, modes, quat, stretch, force, load)
+    system = assemble(rod, held, quat, stretch, force, load)
+    diag, off, border = _class_matrix(
+        rod, held, system, modes.free, modes.weight, modes.axis, quat, stretch, load
+    )
     n, b, r = x.shape
     m = modes.axis.shape[0]
     none, no_row = np.zeros(m), np.zeros((n, b))

@@ -2,11 +2,14 @@
 
 Between two neighbouring states the path is approximated by a cubic in s, the projection on the
 tangent at the start; the state at any s is the cubic's value, corrected orthogonally to that
-tangent. All that is sought within a step is a root in s, and what is found is an equilibrium.
+tangent. All that is sought within a step is a root in s, and what is found is an equilibrium. What
+it lies off the cubic, over the u^2 (1 - u)^2 that vanishes with its rate at both ends, is kept, and
+the next state in the step starts from the polynomial through all of them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -28,6 +31,10 @@ from der.rod import State
 from der.sector import Sector
 
 ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
+_LAST = 1e-9  # of s: a correction this small leaves the next one, its square, below `ROOT`
+_GAIN = 0.5  # of a value: a round that leaves more of it is one that Brent's method does better
+_APART = 0.1  # of a step: states that lie closer would tell more of rounding than of the path
+_MOST = 3  # states kept to interpolate between
 
 
 class Stuck(RuntimeError):
@@ -55,6 +62,8 @@ class Step:
     tally: Tally
     jump: Direction = field(init=False)  # from the start to the end
     end_rate: Direction = field(init=False)  # d jump/ds
+    _found: dict[float, Equilibrium] = field(init=False, default_factory=dict)  # at these s
+    _off: list[tuple[float, Array]] = field(init=False, default_factory=list)  # u, off the cubic
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
@@ -72,8 +81,7 @@ class Step:
     @cached_property
     def _basis(self) -> Array:
         """Rate at the start, jump and rate at the end, each flat: (3, n b + n_c + 1)."""
-        rates = (self.start.tangent, self.jump, self.end_rate)
-        return np.array([np.concatenate([d.q.ravel(), d.force, [d.load]]) for d in rates])
+        return np.array([_flat(d) for d in (self.start.tangent, self.jump, self.end_rate)])
 
     def _hermite(self, s: float) -> tuple[float, float, float]:
         """Weights of the rate at the start, the jump and the rate at the end at ``s``."""
@@ -85,10 +93,38 @@ class Step:
         )
 
     def offset(self, s: float) -> Direction:
-        """Cubic increment from the start to ``s``."""
-        cubic = np.array(self._hermite(s)) @ self._basis
+        """Increment from the start to ``s``: the cubic, and what is known to lie off it."""
+        away = np.array(self._hermite(s)) @ self._basis
+        for weight, off in self._weights(s):
+            away += weight * off
         q = self.jump.q
-        return Direction(cubic[: q.size].reshape(q.shape), cubic[q.size : -1], float(cubic[-1]))
+        return Direction(away[: q.size].reshape(q.shape), away[q.size : -1], float(away[-1]))
+
+    def _weights(self, s: float) -> list[tuple[float, Array]]:
+        """What lies off the cubic, by state, and its weights at ``s`` (Lagrange)."""
+        u = s / self.length
+        bump = (u * (1.0 - u)) ** 2
+        weights = []
+        for one, off in self._off:
+            weight = bump
+            for other, _ in self._off:
+                if other != one:
+                    weight *= (u - other) / (one - other)
+            weights.append((weight, off))
+        return weights
+
+    def _keep(self, s: float, state: State) -> None:
+        """Keep what an equilibrium at ``s`` lies off the cubic, where that says something new."""
+        u = s / self.length
+        places = (0.0, *(place for place, _ in self._off), 1.0)
+        if len(self._off) < _MOST and min(abs(u - place) for place in places) >= _APART:
+            off = _flat(self.between(self.start.state, state))
+            off -= np.array(self._hermite(s)) @ self._basis
+            self._off.append((u, off / (u * (1.0 - u)) ** 2))
+
+    def expected(self, s: float) -> State:
+        """The state at ``s`` as far as the curve tells, not corrected."""
+        return moved(self.piece.held, self.start.state, self.offset(s))
 
     def beyond(self, s: float) -> Direction:
         """Increment from the end to ``s`` beyond it, measured along the tangent there.
@@ -123,31 +159,44 @@ class Step:
             return self.start
         if s == self.length:
             return self.end
-        return self.polished(s, moved(self.piece.held, self.start.state, self.offset(s)))
+        if s not in self._found:
+            self._found[s] = self.polished(s, self.expected(s))
+            self._keep(s, self._found[s].state)
+        return self._found[s]
 
     def change(
         self,
         value: Callable[[Equilibrium], float],
         low: tuple[float, Equilibrium],
         high: tuple[float, Equilibrium],
+        guess: float | None = None,
     ) -> tuple[float, Equilibrium]:
-        """The place between two, and its state, where ``value`` of the state changes its sign."""
+        """The place between two, and its state, where ``value`` of the state changes its sign.
+
+        ``guess``: a place close to it, where one is known.
+        """
         known = dict((low, high))
 
-        def of_place(s: float) -> float:
+        def of_place(s: float, step: Step = self) -> float:
             if s not in known:
-                known[s] = self.at(s)
+                known[s] = step.at(s)
             return value(known[s])
 
-        s = root(of_place, low[0], high[0])
+        s = smooth_root(of_place, low[0], high[0], guess=guess)
+        if s is None:
+            # beside a branch point so good a start leaves what has no stiffness as it was: a
+            # worse one, the cubic alone, costs an iteration more that moves it, too
+            known = dict((low, high))
+            bare = replace(self)
+            s = brent(lambda s: of_place(s, bare), low[0], high[0])
         return s, known[s]
 
     def near(self, s: float) -> State:
-        """A state near the equilibrium at ``s``: the cubic with one correction, half the price."""
+        """A state near the equilibrium at ``s``: the curve with one correction, half the price."""
         found = equilibrium(
             self.piece.body,
             self.piece.held,
-            moved(self.piece.held, self.start.state, self.offset(s)),
+            self.expected(s),
             along=self.start.tangent,
             control=Control.DIRECTION,
             tolerance=0.0,
@@ -159,11 +208,11 @@ class Step:
     def at_load(self, load: float, low: float, high: float) -> tuple[float, Equilibrium]:
         """The equilibrium at ``load`` between s = low and high, where the load is monotonic."""
 
-        def cubic(s: float) -> float:
+        def expected(s: float) -> float:
             return self.start.state.load + self._load(s) - load
 
-        if cubic(low) * cubic(high) < 0.0:
-            s = root(cubic, low, high)
+        if expected(low) * expected(high) < 0.0:
+            s = root(expected, low, high)
             step = self.offset(s)
             step = step._replace(load=load - self.start.state.load)
             try:
@@ -174,7 +223,9 @@ class Step:
             if found is not None and self._near(found, s):
                 # the load given, not the one that differences give, to the last bit
                 found = replace(found, state=found.state.but(load=load))
-                return min(max(self._place(found, s, step), low), high), found
+                s = self._place(found, s, step)
+                self._keep(s, found.state)
+                return min(max(s, low), high), found
         # close to a fold: the load is a bad coordinate there, s is not
         ends = (low, self.at(low)), (high, self.at(high))
         s, found = self.change(lambda at: at.state.load - load, *ends)
@@ -197,7 +248,8 @@ class Step:
         """The load of `offset`, less that of the start."""
         of_start, of_jump, of_end = self._hermite(s)
         start, end = self.start.tangent.load, self.end_rate.load
-        return of_start * start + of_jump * self.jump.load + of_end * end
+        load = of_start * start + of_jump * self.jump.load + of_end * end
+        return load + sum(float(weight * off[-1]) for weight, off in self._weights(s))
 
     def _load_rate(self, s: float) -> float:
         """Its rate, to leading order."""
@@ -247,8 +299,70 @@ class Step:
         return found
 
 
-def root(f: Callable[[float], float], low: float, high: float) -> float:
-    """Root of ``f`` between two places where its signs differ (Brent)."""
+def _flat(d: Direction) -> Array:
+    """A direction as one row."""
+    return np.concatenate([d.q.ravel(), d.force, [d.load]])
+
+
+def root(f: Callable[[float], float], low: float, high: float, within: float = ROOT) -> float:
+    """Root of ``f`` between two places where its signs differ, to ``within``."""
+    s = smooth_root(f, low, high, within)
+    return brent(f, low, high, within) if s is None else s
+
+
+def brent(f: Callable[[float], float], low: float, high: float, within: float = ROOT) -> float:
+    """`root` by Brent's method."""
     from scipy.optimize import brentq
 
-    return float(brentq(f, low, high, xtol=ROOT, rtol=8.9e-16))
+    return float(brentq(f, low, high, xtol=within, rtol=8.9e-16))
+
+
+def smooth_root(
+    f: Callable[[float], float],
+    low: float,
+    high: float,
+    within: float = ROOT,
+    *,
+    guess: float | None = None,
+) -> float | None:
+    """`root` by inverse interpolation through four places; None where ``f`` is not that smooth.
+
+    It takes half as many places as Brent's method; the root is the last of them.
+
+    Parameters
+    ----------
+    guess : the first place to look at.
+    """
+    known = [(f(low), low), (f(high), high)]
+    for value, s in known:
+        if value == 0.0:
+            return s
+    sides = {value > 0.0: s for value, s in known}  # the root lies between these two
+    following, last, least = guess, math.inf, math.inf
+    while True:
+        s = _interpolated(known[-4:]) if following is None else following
+        if not min(sides.values()) < s < max(sides.values()):
+            return None
+        value = f(s)
+        if value == 0.0 or (abs(s - last) < max(within, _LAST) and abs(value) <= least):
+            return s  # a value that grows there is one beyond a jump
+        sides[value > 0.0] = s
+        if not abs(value) <= _GAIN * least:
+            return None
+        known.append((value, s))
+        following, last, least = None, s, abs(value)
+
+
+def _interpolated(known: list[tuple[float, float]]) -> float:
+    """Where the polynomial s(value) through some values and places is at 0; NaN if there is none.
+
+    Neville's scheme.
+    """
+    column = [s for _, s in known]
+    for k in range(1, len(known)):
+        for j in range(len(known) - k):
+            low, high = known[j][0], known[j + k][0]
+            if low == high:
+                return math.nan
+            column[j] = (high * column[j] - low * column[j + 1]) / (high - low)
+    return column[0]

@@ -49,6 +49,7 @@ ROOMS = {
         "equilibrium",
         "chords",
         "step",
+        "passages",
         "branches",
         "special",
         "path",

@@ -20,7 +20,7 @@ BARE = {"n_edges": 32, "stability": False, "contacts": False, "gamma_max": 0.6}
 
 # what may be asked for -> who does it, in the module that calls it
 DOERS = {
-    "stability": ({"stability": True}, "der.special.index_and_stiffness"),
+    "stability": ({"stability": True}, "der.special.indices_and_stiffness"),
     "contacts": ({"contacts": True}, "der.sector.link"),
     "error bars": ({"error_bars": True}, "der.error_bars.error_bars"),
     "shapes": ({"shapes": True}, "der.unfolding.shapes"),
