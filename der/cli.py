@@ -6,8 +6,10 @@ Exit codes: 0 done; 2 bad input, in one line that names the option, the value an
 
 from __future__ import annotations
 
+import atexit
 import inspect
 import math
+import signal
 import sys
 import time
 from contextlib import contextmanager, nullcontext, suppress
@@ -70,6 +72,8 @@ def main(arguments: list[str] | None = None) -> None:
         say(f"der: {text}")
         code = 2
     except (typer.Abort, KeyboardInterrupt) as stopped:
+        # a second Ctrl-C in the midst of leaving would leave semaphores behind
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
         if str(stopped):
             say(f"der: {stopped}")
         code = 130
@@ -751,7 +755,9 @@ def phase(
         str | None, typer.Option(help="'der': ask the rod about a sample of the cases.")
     ] = None,
     sample: Annotated[int, typer.Option(parser=_whole, help="Cases that --check asks about.")] = 40,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="No progress and no summary; warnings.")
+    ] = False,
 ) -> None:
     """Map how rings fold over profile and cross-section: cases, sharp boundaries, a picture."""
     with _options_named():
@@ -778,6 +784,7 @@ def phase(
                 sample=sample,
                 finest=finest,
                 quiet=quiet,
+                warn=lambda words: say(f"der: {words}"),
             )
             if not quiet:
                 show(text)

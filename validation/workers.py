@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
+from der.unfinished import interrupts_ignored
 from validation.figures.drawing import one_thread_each
 
 
@@ -96,9 +97,10 @@ class Processes:
 
     def stop(self) -> None:
         """End them; none has anything on disk that could be torn."""
-        for process in set(multiprocessing.active_children()) - self._others:
-            process.terminate()
-        self.executor.shutdown(cancel_futures=True)
+        with interrupts_ignored():
+            for process in set(multiprocessing.active_children()) - self._others:
+                process.terminate()
+            self.executor.shutdown(cancel_futures=True)
 
     def _pool(self) -> ProcessPoolExecutor:
         spawn = multiprocessing.get_context("spawn")
