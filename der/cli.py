@@ -6,7 +6,9 @@ Exit codes: 0 done; 2 bad input, in one line that names the option, the value an
 
 from __future__ import annotations
 
+import atexit
 import math
+import signal
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -58,6 +60,8 @@ def main(arguments: list[str] | None = None) -> None:
         say(f"der: {text}")
         code = 2
     except (typer.Abort, KeyboardInterrupt) as stopped:
+        # a second Ctrl-C in the midst of leaving would leave semaphores behind
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
         say(f"der: {str(stopped) or 'stopped by the user'}")
         code = 130
     except (OSError, RuntimeError) as wrong:  # a full disk; workers that cannot work
@@ -494,7 +498,9 @@ def phase(
         str | None, typer.Option(help="'der': ask the rod about a sample of the cases.")
     ] = None,
     sample: Annotated[int, typer.Option(parser=whole, help="Cases that --check asks about.")] = 40,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="No progress and no summary; warnings.")
+    ] = False,
 ) -> None:
     """Map how rings fold over profile and cross-section: cases, sharp boundaries, a picture."""
     with options_named():
@@ -521,6 +527,7 @@ def phase(
                 sample=sample,
                 finest=finest,
                 quiet=quiet,
+                warn=lambda words: say(f"der: {words}"),
             )
             if not quiet:
                 show(text)

@@ -121,3 +121,18 @@ def _answered_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[N
         yield
     finally:
         signal.signal(signal.SIGINT, usual)
+
+
+@contextmanager
+def interrupts_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C while workers are put away: a second one would leave semaphores behind."""
+    usual = threading.current_thread() is threading.main_thread()
+    before = signal.getsignal(signal.SIGINT)
+    if not usual or before is None:  # None: whoever set it can set it again, we cannot
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

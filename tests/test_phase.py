@@ -3,6 +3,7 @@
 import csv
 import math
 import multiprocessing
+import re
 import time
 from collections import Counter
 from concurrent.futures import Executor, Future
@@ -139,6 +140,20 @@ def test_command_gets_its_words(diagram, folder):
     assert f"{len(diagram.rows)} cases, 0 solved now" in words
     assert "unstable, snap-back" in words
     assert str(folder / "fig3a.png") in words
+
+
+def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
+    """Without boundaries, edges of the scan; with one that ends in the middle, that end."""
+    half = [replace(curve, points=curve.points[:2]) for curve in diagram.curves]
+    told = []
+    for curves in ([], half):
+        monkeypatch.setattr("validation.phase.follow", lambda *_, c=curves: Boundaries(c, []))
+        options = {"ranges": ["b_over_a=0.9:1", "h-over-t=1.25:2.25"], "finest": 4, "quiet": True}
+        run_phase("fig3a", folder, workers=1, resume=True, warn=told.append, **options)
+    assert re.fullmatch(r"fig3a: edges of the scan without a boundary .*: \d+", told[0])
+    assert re.fullmatch(
+        r"fig3a: ends of boundaries that lead nowhere: \d+, the first with b_over_a = .*", told[-1]
+    )
 
 
 @pytest.mark.parametrize(

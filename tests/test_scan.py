@@ -435,6 +435,22 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path, told):
         assert "Traceback" not in words
 
 
+def test_workers_are_put_away_whatever_is_pressed(monkeypatch):
+    """A second Ctrl-C meanwhile would leave their semaphores behind; afterwards it works again."""
+    with workers(1) as crew:
+        shutdown = crew.executor.shutdown
+
+        def pressed(**options):
+            signal.raise_signal(signal.SIGINT)
+            shutdown(**options)
+
+        monkeypatch.setattr(crew.executor, "shutdown", pressed)
+        crew.stop()
+        monkeypatch.undo()
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
 def test_interrupted_is_a_keyboard_interrupt():
     """So that the command leaves with the exit code of Ctrl-C."""
     assert issubclass(Interrupted, KeyboardInterrupt)

@@ -16,23 +16,29 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from der.scene import Scene
 from validation.cases import Case, Row, solve_case
-from validation.conditions import KINDS, Lost, Value, fresh, on
+from validation.conditions import KINDS, Lost, Value, fresh, numbers, on
 from validation.corners import FOLD, Line, Met, mark_corners
 from validation.crossings import Crossing, Placed, crossings_of, differences, seeds
 from validation.edges import BoundaryPoint, Corner, Curve
 from validation.families import Family
+from validation.folded_states import across, infinite_slope_near, is_half
 from validation.gauss import Array
-from validation.polygons import distance
-from validation.tracing import At, Function, corrected, trace
+from validation.polygons import distance, loose_ends, meetings
+from validation.sides import BESIDE, asked_beside, beside, pieces_of, unlike, where
+from validation.tracing import At, Function, States, corrected, trace
 
-BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for,
-CLOSEST = 3e-5  # and beside one with another near it, at least: nearer, labels do not tell
 NARROW = 1e-3  # of the side: cases so near to each other have the state that a condition needs
+NEAREST = 1e-4  # likewise, beside the end of another curve
+SHARPER = 8  # halvings between such points of a curve
+ROUNDS, ROUND = 3, 12  # of looking round such ends, and in how many places
 BISECTED = 1e-6  # of the diagram's side
 SAME_CURVE = 1e-3  # of the diagram's side: above what chords leave of a curve
 REACH = 3.0  # gaps of the scan within which a crossing must find its curve
@@ -168,6 +174,8 @@ class _Diagram:
         if len(lines) > found:
             kept, met = self._kept(lines)
             left = [narrow for narrow in left if not _explained(narrow, kept)]
+        kept, met = self._continued(lines, kept, met)
+        left = [narrow for narrow in left if not _explained(narrow, kept)]
         curves = [self._curve(line) for line in kept]
         points: dict[str, list[BoundaryPoint]] = defaultdict(list)
         for narrow in self._bisected(left, BISECTED):
@@ -190,6 +198,47 @@ class _Diagram:
             if points and _explained(crossing, lines):
                 return
 
+    def _continued(
+        self, lines: list[Line], kept: list[Line], met: list[Met]
+    ) -> tuple[list[Line], list[Met]]:
+        """What is kept, with the curves on which those that lead nowhere go on."""
+        asked: list[Array] = []
+        for _ in range(ROUNDS):
+            before = len(lines)
+            ends = [end for end in _loose(kept, met) if distance(end, np.array(asked)) > BESIDE]
+            asked += ends
+            for crossing in self._bisected(self._around(ends, kept), NEAREST):
+                self._trace_all(crossing, lines)
+            if len(lines) == before:
+                break
+            kept, met = self._kept(lines)
+        return kept, met
+
+    def _around(self, ends: list[Array], kept: list[Line]) -> list[Crossing]:
+        """Unlike neighbours on small circles, with no curve between that bounds what differs."""
+        turns = 2.0 * math.pi * np.arange(ROUND) / ROUND
+        circle = BESIDE * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        found = []
+        for end in ends:
+            places = [(float(u[0]), float(u[1])) for u in np.clip(end + circle, 0.0, 1.0)]
+            rows = self.solve([self.case(u) for u in places])
+            there = list(zip(places, rows, strict=True))
+            for (a, first), (b, second) in pairwise([*there, there[0]]):
+                chord = np.array([a, b])
+                for kind in differences(first, second):
+                    bounding = [line for line in kept if line.kind in _bounding(kind)]
+                    if not any([*meetings(chord, line.places)] for line in bounding):
+                        found.append(Crossing(kind, a, b, first, second))
+        return found
+
+    def _trace_all(self, crossing: Crossing, lines: list[Line]) -> None:
+        """Add the first curve that is not known and may bound what differs between two cases."""
+        for kind in _bounding(crossing.kind):
+            points = self._traced(kind, crossing)
+            if points and not _known(kind, points, lines):
+                lines.append(Line(kind, points, [None] * len(points)))
+                return
+
     def _traced(self, kind: str, crossing: Crossing) -> list[At[Value]]:
         """The curve between two cases, followed to its ends; none where no condition finds one."""
         condition = self._condition(kind)
@@ -198,7 +247,7 @@ class _Diagram:
                 try:
                     near = corrected(condition, np.array(place), seed, near=REACH * crossing.gap)
                     if crossing.apart(near.u) < REACH * crossing.gap:
-                        return trace(condition, near.u, near.state, fresh=fresh)
+                        return trace(condition, near.u, near.state, states=self._states())
                 except Lost:
                     continue
         return []
@@ -208,12 +257,22 @@ class _Diagram:
 
         def value(u: Array, seed: Value) -> tuple[float, Value]:
             try:
-                found = condition(self.case(u).scene(), seed)
+                if kind == INFINITE and is_half(seed):
+                    found = infinite_slope_near(self._scene, u, seed)
+                else:
+                    found = condition(self._scene(u), seed)
             except ValueError as wrong:
                 raise Lost(str(wrong)) from wrong
             return found.value, found
 
         return value
+
+    def _scene(self, u: Array) -> Scene:
+        """The scene at a place; derivatives by a state ask for the same one again."""
+        return _scene(self.case(u))
+
+    def _states(self) -> States[Value]:
+        return States(lambda seed: across(self._scene, fresh(seed)), numbers)
 
     def _curve(self, line: Line) -> Curve:
         points = [
@@ -244,16 +303,16 @@ class _Diagram:
         """Pieces of curves on whose two sides the modes differ by their kind, and their corners."""
         lines = [Line(line.kind, list(line.points), [None] * len(line.points)) for line in lines]
         met = mark_corners(lines, self._condition)
-        sides = [
-            [_beside(line, k, lines) if c is None else [] for k, c in enumerate(line.corners)]
-            for line in lines
-        ]
-        beside = [self.case(u) for line in sides for places in line for u in places]
-        rows = iter(self.solve(beside))
+        asked = [(n, k) for n, line in enumerate(lines) for k in where(asked_beside(line))]
+        holds: list[list[bool | None]] = [[None] * len(line.points) for line in lines]
+        for _ in range(SHARPER):
+            for (n, k), held in zip(asked, self._hold(lines, asked), strict=True):
+                holds[n][k] = held
+            if not (asked := self._sharpened(lines, holds)):
+                break
         pieces: list[Line] = []
-        for line, own in zip(lines, sides, strict=True):
-            holds = [_bounds(line.kind, next(rows), next(rows)) if u else None for u in own]
-            pieces += _pieces(line, holds)
+        for line, own in zip(lines, holds, strict=True):
+            pieces += pieces_of(line, own)
         pieces.sort(key=lambda piece: -len(piece.points))
         kept: list[Line] = []
         for piece in pieces:
@@ -262,6 +321,32 @@ class _Diagram:
         there = {(corner, piece.kind) for piece in kept for corner in piece.corners}
         met = [replace(m, kinds=tuple(k for k in m.kinds if (m, k) in there)) for m in met]
         return kept, [one for one in met if len(one.kinds) > 1]
+
+    def _hold(self, lines: list[Line], asked: list[tuple[int, int]]) -> Iterator[bool | None]:
+        """Whether the modes on the two sides of points differ; None where that is not to be had."""
+        sides = [beside(lines[n], k, lines) for n, k in asked]
+        rows = iter(self.solve([self.case(u) for places in sides for u in places]))
+        for (n, _), places in zip(asked, sides, strict=True):
+            yield _bounds(lines[n].kind, next(rows), next(rows)) if places else None
+
+    def _sharpened(
+        self, lines: list[Line], holds: list[list[bool | None]]
+    ) -> list[tuple[int, int]]:
+        """New points between neighbours of which one bounds something and the other does not."""
+        new = []
+        for n, (line, own) in enumerate(zip(lines, holds, strict=True)):
+            added = 0
+            for k in unlike(line, own, NARROW):
+                a, b = line.points[k + added : k + added + 2]
+                try:
+                    at = corrected(self._condition(line.kind), 0.5 * (a.u + b.u), a.state)
+                except Lost:
+                    continue
+                added += 1
+                line.insert(k + added, at, None)
+                own.insert(k + added, None)
+                new.append((n, k + added))
+        return new
 
     # --- what only the label tells ---
 
@@ -308,6 +393,17 @@ class _Diagram:
         return unit[0], unit[-1]
 
 
+@lru_cache(maxsize=16)
+def _scene(case: Case) -> Scene:
+    return case.scene()
+
+
+def _loose(kept: list[Line], met: list[Met]) -> list[Array]:
+    """The ends of curves that lead nowhere."""
+    ends = [(line.corners[0] in met, line.corners[-1] in met) for line in kept]
+    return [kept[n].points[k].u for n, k in loose_ends([line.places for line in kept], ends)]
+
+
 def _explained(crossing: Crossing, lines: Iterable[Line]) -> bool:
     """Whether a curve that bounds what differs passes between two cases, or close by."""
     kinds = _bounding(crossing.kind)
@@ -323,24 +419,6 @@ def _known(kind: str, points: Sequence[At[Value]], lines: Iterable[Line]) -> boo
     return any(line.kind == kind and distance(middle, line.places) < SAME_CURVE for line in lines)
 
 
-def _beside(line: Line, k: int, lines: Iterable[Line]) -> list[Array]:
-    """Two places, one on each side of a curve at its k-th point, with no other curve between.
-
-    None where another one is too near.
-    """
-    places = line.places
-    way = places[min(k + 1, len(places) - 1)] - places[max(k - 1, 0)]
-    normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
-    free = min(
-        (distance(places[k], other.places) for other in lines if other.kind != line.kind),
-        default=math.inf,
-    )
-    reach = min(BESIDE, 0.3 * free)
-    if reach < CLOSEST:
-        return []
-    return [np.clip(places[k] + sign * reach * normal, 0.0, 1.0) for sign in (1.0, -1.0)]
-
-
 def _bounds(kind: str, one: Row, other: Row) -> bool:
     """Whether two cases differ by what a curve of this kind bounds."""
     return any(kind in _bounding(what) for what in differences(one, other))
@@ -349,34 +427,3 @@ def _bounds(kind: str, one: Row, other: Row) -> bool:
 def _bounding(what: str) -> tuple[str, ...]:
     """Kinds of boundaries at which this changes, the likeliest first."""
     return (FOLD, INFINITE, EXCHANGE) if what == FOLD else (what, EXCHANGE)
-
-
-def _pieces(line: Line, holds: Sequence[bool | None]) -> list[Line]:
-    """A curve's pieces that bound something, to the corners at their ends.
-
-    Parameters
-    ----------
-    holds : whether the modes on the two sides of a point differ; None: a corner, or so near to
-        another curve that they do not tell
-    """
-    kept = [held is True for held in holds]
-    for k in [k for k, held in enumerate(holds) if held]:
-        for way in (1, -1):
-            end = k + way
-            while 0 <= end < len(holds) and holds[end] is None and line.corners[end] is None:
-                end += way
-            beyond = not 0 <= end < len(holds)
-            if beyond or holds[end] is not False:
-                inside = range(k, end, way) if beyond else range(k, end + way, way)
-                for j in inside:
-                    kept[j] = True
-    pieces = []
-    start = None
-    for k, held in enumerate([*kept, False]):
-        if held and start is None:
-            start = k
-        elif not held and start is not None:
-            if k - start > 1:
-                pieces.append(Line(line.kind, line.points[start:k], line.corners[start:k]))
-            start = None
-    return pieces

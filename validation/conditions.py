@@ -23,7 +23,7 @@ import numpy as np
 from der.scene import Scene
 from validation.collocation import Collocation, Direction, Failure, Solution, collocation
 from validation.corrector import observe
-from validation.exchanges import Centre, centre, shot
+from validation.exchanges import Centre, centre, hysteresis, shot
 from validation.gauss import Array
 from validation.meshes import Mesh, fitted, mesh_at, moved_to
 from validation.sectors import sector
@@ -49,6 +49,8 @@ class Value(NamedTuple):
     at: Solution
     system: Collocation
     psi: Array | None = None  # of an exchange, see `exchanges`: its state has no tangent
+    way: Array | None = None  # of an infinite slope, see `folded_states`: across the boundary
+    place: Array | None = None  # likewise: on the boundary, of which the state is
 
 
 Condition = Callable[[Scene, Value], Value]
@@ -62,7 +64,7 @@ def carried(scene: Scene, seed: Value) -> tuple[Collocation, Solution]:
     Lost
         Where the rings have other segments, or no solution is near.
     """
-    system, mesh = _scaled(scene, seed)
+    system, mesh = scaled(scene, seed)
     at = seed.at
     found = system.solved(
         mesh, Direction(at.frames, at.p, at.gamma), at.tangent, tolerance=TIGHT, iterations=15
@@ -72,8 +74,14 @@ def carried(scene: Scene, seed: Value) -> tuple[Collocation, Solution]:
     return system, found
 
 
-def _scaled(scene: Scene, seed: Value) -> tuple[Collocation, Mesh]:
-    """The seed's mesh for another ring, segment by segment."""
+def scaled(scene: Scene, seed: Value) -> tuple[Collocation, Mesh]:
+    """The seed's mesh for another ring, segment by segment.
+
+    Raises
+    ------
+    Lost
+        Where the rings have other segments.
+    """
     system = collocation(sector(scene))
     old, new = seed.system.sector, system.sector
     if len(old.joints) != len(new.joints):
@@ -125,6 +133,11 @@ def _size(seed: Value) -> float:
         fine = on(at.mesh.halved, seed).at
         gamma, moment = abs(fine.gamma - at.gamma), abs(fine.moment - at.moment)
     return max(gamma / math.pi, moment / max(abs(at.moment), 1.0))
+
+
+def numbers(state: Value) -> Array:
+    """The constants of a state and its gamma."""
+    return np.append(state.at.p, state.at.gamma)
 
 
 def stability(scene: Scene, seed: Value) -> Value:
@@ -195,7 +208,7 @@ def _not_folded(at: Solution) -> None:
 
 def exchange(scene: Scene, seed: Value) -> Value:
     """How far two branches of equilibria are from meeting; the seed lies between them."""
-    system, mesh = _scaled(scene, seed)
+    system, mesh = scaled(scene, seed)
     return _exchanged(system, mesh, seed.at.frames, seed)
 
 
@@ -214,6 +227,17 @@ def _state(system: Collocation, mesh: Mesh, found: Centre) -> Solution:
     none = Direction(np.zeros_like(at.frames), np.zeros_like(p), 0.0)
     energy *= system.sector.copies
     return Solution(mesh, at.frames, p, gamma, moment, energy, none, 0.0, 0, at.nodes, at.places, 0)
+
+
+def asymptotic(state: Value) -> float:
+    """Zero where an exchange touches a cusp, see `exchanges.hysteresis`."""
+    at, psi = state.at, state.psi
+    if psi is None:
+        raise Lost("not the state of an exchange")
+    try:
+        return hysteresis(state.system, at.mesh, at.frames, np.append(at.p, at.gamma), psi)
+    except ArithmeticError as problem:
+        raise Lost(str(problem)) from problem
 
 
 def closeness(system: Collocation, at: Solution) -> tuple[float, Array]:

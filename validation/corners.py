@@ -1,9 +1,10 @@
 """Corners of a phase diagram: where two boundaries meet, solved for with the conditions of both.
 
-Boundaries of unlike things cross, and their polygons say where to begin. The curve of the fold at
+Boundaries of unlike states cross, and their polygons say where to begin. The curve of the fold at
 pi touches others instead, where they have a state of which one more thing is true: those of
 exchanges and cusps where their gamma is pi, that of the infinite slope where gamma = pi is crossed
-to the fifth order. That is the second condition then. The curve of a cusp ends there, too.
+to the fifth order. That is the second condition then. The curve of a cusp ends there, too. It
+touches that of exchanges where gamma is stationary along an asymptote of the paths.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from validation.conditions import Lost, Value, on, steepening
+from validation.conditions import Lost, Value, asymptotic, on, steepening
 from validation.gauss import Array
 from validation.polygons import meetings, nearest
 from validation.tracing import DIFFERENCE, EXACT, At, Function, corrected
@@ -28,12 +29,20 @@ def _gamma(state: Value) -> float:
     return state.at.gamma - math.pi
 
 
-TOUCHING = {  # what touches the fold at pi, and where
-    "exchange": _gamma,
-    "snap-back": _gamma,
-    "infinite slope": steepening,
+CUSP = "snap-back"
+TOUCHING = {  # what touches what, and where
+    ("exchange", FOLD): _gamma,
+    ("exchange", CUSP): asymptotic,
+    (CUSP, FOLD): _gamma,
+    ("infinite slope", FOLD): steepening,
 }
-ORDER = (*TOUCHING, "stability", FOLD)  # the first's state is the one that a corner tells of
+ORDER = (
+    "exchange",
+    CUSP,
+    "infinite slope",
+    "stability",
+    FOLD,
+)  # the first's state is the one that a corner tells of
 NEAR = 0.1  # of the square's side: a corner lies so near to its bracket
 BESIDE = 0.02  # of the side: a curve that ends so near to a corner on it ends there
 ASIDE = 2.5e-3  # of the side: what a chord of a curve is off at most
@@ -85,29 +94,27 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
     """Solve for all corners, and put each among the points of its curves."""
     found: list[Met] = []
     for one, other in combinations(sorted(lines, key=lambda line: ORDER.index(line.kind)), 2):
-        if one.kind == other.kind:
-            continue
         for u in [meeting.place for meeting in meetings(one.places, other.places)]:
             if (met := _meeting(one, other, u, condition)) is not None:
                 met = _once(met, found)
                 _put(one, met.first, met)
                 _put(other, met.second, met)
-    for line in [line for line in lines if line.kind in TOUCHING]:
-        for k in _touching(line):
-            u = 0.5 * (line.points[k].u + line.points[k + 1].u)
-            try:
-                met = _solved(
-                    (line.kind, FOLD), u, (line.points[k].state,) * 2, condition, touching=True
-                )
-            except Lost:
-                continue
-            kinds = (*met.kinds, "snap-back") if line.kind == "infinite slope" else met.kinds
-            met = _once(replace(met, kinds=kinds), found)
-            _put(line, met.first, met)
-            for other in [other for other in lines if other.kind in kinds[1:]]:
-                if _has(other, met):
-                    _put(other, met.second, met)
-                    _end(other, met)
+    for (kind, touched), value in TOUCHING.items():
+        for line in [line for line in lines if line.kind == kind]:
+            for k in _touching(line, value):
+                u = 0.5 * (line.points[k].u + line.points[k + 1].u)
+                seeds = (line.points[k].state,) * 2
+                try:
+                    met = _solved((kind, touched), u, seeds, condition, value)
+                except Lost:
+                    continue
+                kinds = (*met.kinds, CUSP) if kind == "infinite slope" else met.kinds
+                met = _once(replace(met, kinds=kinds), found)
+                _put(line, met.first, met)
+                for other in [other for other in lines if other.kind in kinds[1:]]:
+                    if _has(other, met):
+                        _put(other, met.second, met)
+                        _end(other, met)
     for line in lines:
         _separate(line, condition(line.kind))
     return found
@@ -125,7 +132,7 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
         if _same(*seeds):  # they touch, or are one: polygons cross there by chance
             return None
         try:
-            met = _solved((one.kind, other.kind), u, seeds, condition, touching=False)
+            met = _solved((one.kind, other.kind), u, seeds, condition)
         except Lost:
             continue
         if all(nearest(met.first.u, line.places)[1] < ASIDE for line in (one, other)):
@@ -134,8 +141,11 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
 
 
 def _has(line: Line, met: Met) -> bool:
-    """Whether a curve comes close to a corner in a state like the corner's."""
-    near = [at for at in line.points if np.linalg.norm(at.u - met.first.u) < BESIDE]
+    """Whether a curve passes a corner, or ends close to it, in a state like the corner's."""
+    apart = [float(np.linalg.norm(at.u - met.first.u)) for at in line.points]
+    if nearest(met.first.u, line.places)[1] > ASIDE and min(apart[0], apart[-1]) > BESIDE:
+        return False
+    near = [at for at, far in zip(line.points, apart, strict=True) if far < BESIDE]
     return any(_same(at.state, met.second.state, LIKE) for at in near)
 
 
@@ -160,12 +170,12 @@ def _separate(line: Line, condition: Function[Value]) -> None:
             line.insert(k + 1, between, None)
 
 
-def _touching(line: Line) -> list[int]:
-    """After which points of a curve it touches that of the fold at pi, the last one first."""
+def _touching(line: Line, value: Callable[[Value], float]) -> list[int]:
+    """After which points of a curve a function of its states is zero, the last one first."""
     values = []
     for at in line.points:
         try:
-            values.append(TOUCHING[line.kind](at.state))
+            values.append(value(at.state))
         except Lost:
             values.append(math.nan)
     return [k for k in range(len(values) - 2, -1, -1) if values[k] * values[k + 1] < 0.0]
@@ -215,16 +225,20 @@ def _solved(
     u: Array,
     seeds: tuple[Value, Value],
     condition: ConditionOf,
-    *,
-    touching: bool,
+    touching: Callable[[Value], float] | None = None,
 ) -> Met:
-    """Both conditions' root near ``u`` (Newton's method, Broyden's update of the derivatives)."""
+    """Both conditions' root near ``u`` (Newton's method, Broyden's update of the derivatives).
+
+    Parameters
+    ----------
+    touching : of a state of the first kind, in place of the second's condition
+    """
     one = condition(kinds[0])
 
     def both(u: Array, seeds: tuple[Value, Value]) -> tuple[Array, tuple[Value, Value]]:
         f, first = one(u, seeds[0])
-        if touching:
-            return np.array([f, TOUCHING[kinds[0]](first)]), (first, first)
+        if touching is not None:
+            return np.array([f, touching(first)]), (first, first)
         g, second = condition(kinds[1])(u, seeds[1])
         return np.array([f, g]), (first, second)
 

@@ -156,6 +156,26 @@ def centre(
     return None
 
 
+def hysteresis(system: Collocation, mesh: Mesh, frames: Array, x: Array, psi: Array) -> float:
+    """psi^T G_pp n n, where n is the change of p that leaves G as it is with gamma held.
+
+    The paths near an exchange are hyperbolas. Where this is zero, gamma is stationary along one of
+    their asymptotes: the fold that each has on one side of the exchange has gone to infinity, and
+    the curve of cusps touches that of exchanges.
+
+    Raises
+    ------
+    ArithmeticError
+        Where the rod cannot be shot.
+    """
+    here = shot(system, mesh, frames, x)
+    bend = _bend(system, mesh, here, x, psi) if here.ok else None
+    if bend is None:
+        raise ArithmeticError("the rod cannot be shot")
+    still = np.linalg.svd(here.rates[:, :-1])[2][-1]
+    return float(still @ bend[:-1, :-1] @ still)
+
+
 def _bend(system: Collocation, mesh: Mesh, here: Shot, x: Array, psi: Array) -> Array | None:
     """Second derivatives of psi^T G by x, by central differences of its first; symmetric."""
     out = np.empty((len(x), len(x)))

@@ -1,4 +1,8 @@
-"""The boundaries of a scanned diagram, followed by workers that may die."""
+"""The boundaries of a scanned diagram, followed by workers that may die; and what they leave open.
+
+Boundaries are complete where they separate all unlike neighbours of the scan (`unexplained`), and
+where none of them leads nowhere (`loose_ends`).
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from validation import polygons
 from validation.boundaries import (
     Boundaries,
     Slice,
@@ -18,7 +23,8 @@ from validation.boundaries import (
     slices,
 )
 from validation.cases import Case, Row
-from validation.edges import Curve, scanned_boundaries
+from validation.edges import BoundaryPoint, Corner, Curve, scanned_boundaries
+from validation.families import Family
 from validation.gauss import Array
 from validation.jobs import Jobs
 from validation.polygons import distance
@@ -91,9 +97,7 @@ def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
     family = found.family
     lines: dict[str, list[Array]] = {}
     for curve in curves:
-        places = [family.unit(point.case) for point in curve.points]
-        known = np.array([place for place in places if place is not None])
-        if len(known):
+        if len(known := _places(family, curve)):
             lines.setdefault(curve.twist_axis, []).append(known)
     return sum(
         min(
@@ -105,3 +109,31 @@ def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
         for point in curve.points
         if (place := family.unit(point.case)) is not None
     )
+
+
+def loose_ends(
+    family: Family, curves: Iterable[Curve], corners: Iterable[Corner]
+) -> list[BoundaryPoint]:
+    """Ends of curves in the middle of nowhere.
+
+    They are neither corners, nor on an edge of their square, nor on another curve of it. A closed
+    curve has no ends.
+    """
+    meet = {corner.point.case for corner in corners}
+    squares: dict[tuple[object, ...], list[Curve]] = {}
+    for curve in curves:
+        if len(places := _places(family, curve)):
+            plane = (round(float(part), 9) for part in places[0, 1:-1])
+            squares.setdefault((curve.twist_axis, *plane), []).append(curve)
+    found = []
+    for own in squares.values():
+        lines = [_places(family, curve)[:, [0, -1]] for curve in own]
+        ends = [(c.points[0].case in meet, c.points[-1].case in meet) for c in own]
+        found += [own[n].points[k] for n, k in polygons.loose_ends(lines, ends)]
+    return found
+
+
+def _places(family: Family, curve: Curve) -> Array:
+    """Unit coordinates of the points of a curve that lie in the diagram, (n, dimension)."""
+    places = [family.unit(point.case) for point in curve.points]
+    return np.array([place for place in places if place is not None])

@@ -12,7 +12,7 @@ import io
 import math
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
 
@@ -21,7 +21,7 @@ from validation.boundaries import Boundaries
 from validation.cases import LABELS, PARAMETERS, Case, Row, solve_case
 from validation.edges import Corner, Curve
 from validation.families import FAMILIES, Family, family
-from validation.following import follow, unexplained
+from validation.following import follow, loose_ends, unexplained
 from validation.rod_check import Compared, Fold, rod_check, table
 from validation.scan import Scan, Solve, scan
 from validation.store import Store
@@ -148,9 +148,13 @@ def run_phase(
     sample: int = SAMPLE,
     finest: int | None = None,
     quiet: bool = False,
+    warn: Callable[[str], object] = lambda words: None,
     solve: Solve = solve_case,
 ) -> str:
-    """`phase` for the command line: ranges as "b_over_a=0.7:1"; returns what there is to say."""
+    """`phase` for the command line: ranges as "b_over_a=0.7:1"; returns what there is to say.
+
+    What the boundaries leave open is told to ``warn``, quiet or not.
+    """
     diagram = phase(
         name,
         folder,
@@ -165,7 +169,25 @@ def run_phase(
         progress=not quiet,
         solve=solve,
     )
+    for words in doubts(diagram):
+        warn(f"{name}: {words}")
     return summary(diagram)
+
+
+def doubts(diagram: Diagram) -> list[str]:
+    """In what the boundaries of a diagram are not complete, a line each; none if they are."""
+    family, curves = diagram.family, diagram.curves
+    lines = []
+    if left := unexplained(diagram.scan, curves):
+        lines.append(f"edges of the scan without a boundary within 1.5 cells: {left}")
+    if ends := loose_ends(family, curves, diagram.corners):
+        case = ends[0].case
+        place = ", ".join(f"{name} = {getattr(case, name):.6g}" for name in family.parameters)
+        lines.append(
+            f"ends of boundaries that lead nowhere: {len(ends)}, the first with {place}, "
+            f"about {case.twist_axis}"
+        )
+    return lines
 
 
 def summary(diagram: Diagram) -> str:
@@ -185,8 +207,6 @@ def summary(diagram: Diagram) -> str:
     kinds = Counter(curve.kind for curve in diagram.curves)
     words = [f"{n} {kind}" for kind, n in kinds.items()]
     lines.append(f"boundaries: {', '.join(words)}; {len(diagram.corners)} corners")
-    if left := unexplained(diagram.scan, diagram.curves):
-        lines.append(f"  {left} edges of the scan have no boundary within 1.5 cells")
     if diagram.compared:
         lines.append(table(diagram.compared))
     return "\n".join([*lines, *map(str, diagram.files)])

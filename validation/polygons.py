@@ -1,14 +1,17 @@
-"""Polygons through the points of curves in a plane: distances from them, and where two cross."""
+"""Polygons through the points of curves in a plane: distances, where two cross, loose ends."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from validation.gauss import Array
+
+MEETS = 1e-3  # of the square's side: above what chords leave of a curve
+CLOSES = 1.5  # times its longest step: the ends of a closed curve are not farther from each other
 
 
 class Meeting(NamedTuple):
@@ -48,3 +51,30 @@ def meetings(one: Array, other: Array) -> Iterator[Meeting]:
     inside = (s >= 0.0) & (s < 1.0) & (t >= 0.0) & (t < 1.0)
     for i, j in np.argwhere(inside):
         yield Meeting(int(i), int(j), one[i] + s[i, j] * (one[i + 1] - one[i]))
+
+
+def loose_ends(
+    lines: Sequence[Array], corners: Sequence[tuple[bool, bool]]
+) -> list[tuple[int, int]]:
+    """Which lines, (n, 2) in the unit square, lead nowhere: their numbers, and 0 or -1 for the end.
+
+    Such an end is no corner, nor on an edge of the square, nor on another line. A closed line has
+    no ends.
+
+    Parameters
+    ----------
+    corners : whether the first and the last point of each line is one
+    """
+    found = []
+    for n, line in enumerate(lines):
+        steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        apart = float(np.linalg.norm(line[-1] - line[0]))
+        if len(steps) > 2 and apart < CLOSES * float(steps.max()):
+            continue
+        for known, k in zip(corners[n], (0, -1), strict=True):
+            here = line[k]
+            edge = bool(((here < MEETS) | (here > 1.0 - MEETS)).any())
+            others = (distance(here, other) for m, other in enumerate(lines) if m != n)
+            if not (known or edge or any(apart < MEETS for apart in others)):
+                found.append((n, k))
+    return found

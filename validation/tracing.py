@@ -8,6 +8,7 @@ special happens. It ends at the edges of the square, where it closes, or where t
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,10 +19,14 @@ from validation.gauss import Array
 T = TypeVar("T")
 Function = Callable[[Array, T], tuple[float, T]]
 
-LARGEST, SMALLEST = 0.04, 1e-5  # steps, of the square's side
+LARGEST, SMALLEST = 0.04, 2e-6  # steps, of the square's side
 DIFFERENCE = 1e-5  # for the gradient
 EXACT = 1e-9  # distance from the curve, of the square's side
 SHARPEST = 0.35  # rad, between tangents of neighbouring points
+BENT = (
+    0.05  # of the change of a state between neighbours: midway, what it is off their mean at most
+)
+STILL = 1e-3  # of a state: a change that is not looked at
 MOST = 2000
 
 
@@ -74,32 +79,45 @@ def _gradient(f: Function[T], u: Array, value: float, state: T) -> Array:
     return out
 
 
-def trace(
-    f: Function[T], u: Array, state: T, *, fresh: Callable[[T], T] = lambda state: state
-) -> list[At[T]]:
+@dataclass(frozen=True)
+class States(Generic[T]):
+    """What has to be known of the states that go along.
+
+    Parameters
+    ----------
+    fresh : called with the state of every point, may give back a better one to go on with
+    numbers : what makes up a state, which changes smoothly along a curve
+    """
+
+    fresh: Callable[[T], T] = lambda state: state
+    numbers: Callable[[T], Array] = lambda state: np.empty(0)
+
+
+def trace(f: Function[T], u: Array, state: T, *, states: States[T] | None = None) -> list[At[T]]:
     """The curve through (or near) ``u``, from one end to the other.
 
     Parameters
     ----------
     f : value and state at a place, from a state nearby.
-    fresh : called with the state of every point, may give back a better one to go on with.
+    states : what to do with states; without, nothing
 
     Raises
     ------
     Lost
         Where there is no point of the curve near ``u``.
     """
-    first = corrected(f, np.asarray(u, dtype=float), fresh(state))
+    states = states or States()
+    first = corrected(f, np.asarray(u, dtype=float), states.fresh(state))
     gradient = first.gradient
-    ahead, closed = _half(f, fresh, first, np.array([-gradient[1], gradient[0]]))
+    ahead, closed = _half(f, states, first, np.array([-gradient[1], gradient[0]]))
     if closed:
         return [first, *ahead]
-    behind, _ = _half(f, fresh, first, np.array([gradient[1], -gradient[0]]))
+    behind, _ = _half(f, states, first, np.array([gradient[1], -gradient[0]]))
     return [*reversed(behind), first, *ahead]
 
 
 def _half(
-    f: Function[T], fresh: Callable[[T], T], first: At[T], direction: Array
+    f: Function[T], states: States[T], first: At[T], direction: Array
 ) -> tuple[list[At[T]], bool]:
     """The curve from a point on in one direction, and whether it came back to it."""
     found: list[At[T]] = []
@@ -122,7 +140,11 @@ def _half(
         if way @ tangent < 0.0:
             way = -way
         angle = float(np.arccos(np.clip(way @ tangent, -1.0, 1.0)))
-        if angle > SHARPEST or (new.u - here.u) @ tangent <= 0.0:
+        if (
+            angle > SHARPEST
+            or (new.u - here.u) @ tangent <= 0.0
+            or not _smooth(f, states, here, new)
+        ):
             step *= 0.5
             continue
         if _outside(new.u):
@@ -132,9 +154,22 @@ def _half(
         found.append(new)
         if len(found) > 3 and np.linalg.norm(new.u - first.u) < 0.75 * step:
             return found, True
-        here, tangent = new._replace(state=fresh(new.state)), way
+        here, tangent = new._replace(state=states.fresh(new.state)), way
         step = min(step * (1.3 if angle < 0.5 * SHARPEST else 0.8), LARGEST)
     return found, False
+
+
+def _smooth(f: Function[T], states: States[T], here: At[T], new: At[T]) -> bool:
+    """Whether the state midway lies between those of two points: else they are on two curves."""
+    a, b = states.numbers(here.state), states.numbers(new.state)
+    change = float(np.linalg.norm(b - a))
+    if change <= STILL * (1.0 + float(np.linalg.norm(a))):
+        return True
+    try:
+        _, state = f(0.5 * (here.u + new.u), here.state)
+    except Lost:
+        return False
+    return float(np.linalg.norm(states.numbers(state) - 0.5 * (a + b))) <= BENT * change
 
 
 def _outside(u: Array) -> bool:

@@ -17,6 +17,8 @@ from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Any, Protocol
 
+from der.unfinished import interrupts_ignored
+
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -96,9 +98,10 @@ class Processes:
 
     def stop(self) -> None:
         """End them; none has anything on disk that could be torn."""
-        for process in set(multiprocessing.active_children()) - self._others:
-            process.terminate()
-        self.executor.shutdown(cancel_futures=True)
+        with interrupts_ignored():
+            for process in set(multiprocessing.active_children()) - self._others:
+                process.terminate()
+            self.executor.shutdown(cancel_futures=True)
 
     def _pool(self) -> ProcessPoolExecutor:
         spawn = multiprocessing.get_context("spawn")
