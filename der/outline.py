@@ -6,6 +6,7 @@ counter-clockwise; halfway, at s = L/2, it crosses the positive second axis. Its
 """
 
 from dataclasses import dataclass
+from functools import cache
 from functools import cached_property
 from typing import Protocol, TypeAlias
 
@@ -124,10 +125,17 @@ def _chord(u: Array, angle: Array, curvature: Array, slope: Array) -> ComplexArr
 
     24 Gauss points are exact to rounding up to LARGEST_TURN, and for a fillet with many to spare.
     """
-    node, weight = np.polynomial.legendre.leggauss(24)
+    node, weight = _gauss()
     v = np.multiply.outer(u, (1 + node) / 2)
     turned = v * (curvature[..., None] + slope[..., None] * v / 2)
     return u / 2 * np.exp(1j * angle) * (np.exp(1j * turned) @ weight)
+
+
+@cache
+def _gauss() -> tuple[Array, Array]:
+    """The 24 Gauss points in [-1, 1] and their weights, which take longer to find than to use."""
+    node, weight = np.polynomial.legendre.leggauss(24)
+    return node, weight
 
 
 def reflected(knots: Array, start: Array, end: Array) -> Bends:

@@ -32,7 +32,7 @@ from validation.families import Family
 from validation.folded_states import across, infinite_slope_near, is_half
 from validation.gauss import Array
 from validation.polygons import distance, loose_ends, meetings
-from validation.sides import BESIDE, asked_beside, beside, pieces_of, unlike, where
+from validation.sides import BESIDE, SAME_CURVE, asked_beside, beside, pieces_of, unlike, where
 from validation.tracing import At, Function, States, corrected, trace
 
 NARROW = 1e-3  # of the side: cases so near to each other have the state that a condition needs
@@ -40,7 +40,6 @@ NEAREST = 1e-4  # likewise, beside the end of another curve
 SHARPER = 8  # halvings between such points of a curve
 ROUNDS, ROUND = 3, 12  # of looking round such ends, and in how many places
 BISECTED = 1e-6  # of the diagram's side
-SAME_CURVE = 1e-3  # of the diagram's side: above what chords leave of a curve
 REACH = 3.0  # gaps of the scan within which a crossing must find its curve
 EXCHANGE = "exchange"
 INFINITE = "infinite slope"

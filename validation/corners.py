@@ -10,7 +10,7 @@ touches that of exchanges where gamma is stationary along an asymptote of the pa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -50,6 +50,7 @@ SAME = 1e-6  # of the side: two corners so near are one
 DIFFERENT = 0.05  # gamma and M of states that are not the same, together
 LIKE = 0.5  # likewise, of those on a curve that ends in a corner: they change with a root there
 MOST = 20
+STEPS = 8  # along the side of a polygon
 
 ConditionOf = Callable[[str], Function[Value]]
 
@@ -124,13 +125,24 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
     """The corner near the crossing of two polygons, on both curves; None where there is none.
 
     A state of either may turn into another one on its way to the corner, which is on another curve
-    then; so those at both ends of the polygon's side are tried.
+    then, or be lost; so those at both ends of the polygon's side are tried, and then those led
+    along it.
     """
     (i, _), (j, _) = nearest(u, one.places), nearest(u, other.places)
-    for first, second in product(one.points[i : i + 2], other.points[j : j + 2]):
+    firsts, seconds = one.points[i : i + 2], other.points[j : j + 2]
+    if any(_same(a.state, b.state) for a, b in product(firsts, seconds)):
+        return None  # they touch, or are one: polygons cross there by chance
+
+    def pairs() -> Iterator[tuple[At[Value], At[Value]]]:
+        yield from product(firsts, seconds)
+        led = [
+            [_led(condition(line.kind), at, u) for at in ends]
+            for line, ends in ((one, firsts), (other, seconds))
+        ]
+        yield from product(*([at for at in ends if at is not None] for ends in led))
+
+    for first, second in pairs():
         seeds = first.state, second.state
-        if _same(*seeds):  # they touch, or are one: polygons cross there by chance
-            return None
         try:
             met = _solved((one.kind, other.kind), u, seeds, condition)
         except Lost:
@@ -138,6 +150,17 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
         if all(nearest(met.first.u, line.places)[1] < ASIDE for line in (one, other)):
             return met
     return None
+
+
+def _led(condition: Function[Value], at: At[Value], u: Array) -> At[Value] | None:
+    """A curve's point near ``u``, by short steps from another; None where it is lost."""
+    start = at.u
+    try:
+        for k in range(1, STEPS + 1):
+            at = corrected(condition, start + (u - start) * k / STEPS, at.state)
+    except Lost:
+        return None
+    return at
 
 
 def _has(line: Line, met: Met) -> bool:

@@ -13,6 +13,7 @@ from validation.polygons import distance, meetings
 
 BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for,
 CLOSEST = 3e-5  # and beside one with another near it, at least: nearer, labels do not tell
+SAME_CURVE = 1e-3  # of the side: above what chords leave of a curve
 CROWDED = 2e-4  # likewise: points nearer to each other than this have one pair of labels
 
 
@@ -50,10 +51,12 @@ def beside(line: Line, k: int, lines: Iterable[Line]) -> list[Array]:
     places = line.places
     way = places[min(k + 1, len(places) - 1)] - places[max(k - 1, 0)]
     normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
-    free = min(
-        (distance(places[k], other.places) for other in lines if other.kind != line.kind),
-        default=math.inf,
-    )
+    free = math.inf
+    for other in lines:
+        away = distance(places[k], other.places)
+        # a curve of the same kind that is nearer than that is the same one, followed twice
+        if other.kind != line.kind or (other is not line and away > SAME_CURVE):
+            free = min(free, away)
     free = min(free, *(_own(places, k, sign * BESIDE * normal) for sign in (1.0, -1.0)))
     reach = min(BESIDE, 0.3 * free)
     if reach < CLOSEST:
