@@ -6,8 +6,7 @@ counter-clockwise; halfway, at s = L/2, it crosses the positive second axis. Its
 """
 
 from dataclasses import dataclass
-from functools import cache
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Protocol, TypeAlias
 
 import numpy as np
