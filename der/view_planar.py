@@ -28,7 +28,7 @@ from der.view_style import (
     legend_below,
 )
 
-COLUMNS = 5
+COLUMNS = 6  # at most
 CELL, ROW = 1.55, 1.95  # inches, of a state
 APART = 0.16  # of the radius: how far the strands of a covered ring are drawn apart
 LARGER = 2.0  # small shapes are drawn, at most, over the scale of the largest
@@ -55,8 +55,8 @@ def figure_of_planar(found: PlanarStates | Squeeze) -> Figure:
 
 
 def _of_states(found: PlanarStates) -> Figure:
-    columns = min(COLUMNS, len(found))
-    rows = math.ceil(len(found) / columns)
+    rows = math.ceil(len(found) / COLUMNS)
+    columns = math.ceil(len(found) / rows)
     width, height = max(columns * CELL, 5.4) + 0.3, rows * ROW + 0.95
     figure = blank((width, height))
     figure.text(0.5, 1.0 - 0.2 / height, _title(found, "in its plane"), **TITLE)
