@@ -96,9 +96,10 @@ def _advance(
     before: Step | None,
     length: float,
 ) -> Step:
-    """One accepted step of at most ``length``, shortened until Newton's method follows."""
+    """One accepted step of about ``length``, shortened until Newton's method follows."""
     t = start.tangent
     reason = ""
+    length = max(length, 2.0 * SMALLEST_STEP)
     while length > SMALLEST_STEP:
         if before is None:
             guess = Direction(length * t.q, length * t.force, length * t.load)

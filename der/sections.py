@@ -10,6 +10,7 @@ from typing import Self
 
 from der.checks import checked_number, positive
 
+SPREAD = 1e10  # of the stiffnesses, GJ among them: beyond, rounding of one hides another
 ODD_ZETA_5 = 31 / 32 * 1.0369277551433699  # sum of 1/(2n-1)^5 over n >= 1, with zeta(5)
 
 
@@ -35,7 +36,8 @@ class Section:
     Raises
     ------
     ValueError
-        If a number is not finite, a ratio not > 0, or nu outside (-1, 0.5].
+        If a number is not finite, a ratio not > 0, nu outside (-1, 0.5], or the largest of alpha,
+        beta and 1 more than 1e10 times the smallest.
     """
 
     alpha: float
@@ -54,6 +56,12 @@ class Section:
             checked["nu"] = _poisson_ratio(self.nu)
         for name, number in checked.items():
             object.__setattr__(self, name, number)
+        if not max(self.alpha, self.beta, 1.0) <= SPREAD * min(self.alpha, self.beta, 1.0):
+            name, other = ("alpha", "beta") if self.alpha < self.beta else ("beta", "alpha")
+            raise ValueError(
+                f"{name} must be such that alpha, beta and 1 are within a factor of {SPREAD:g}, "
+                f"got {getattr(self, name)!r} and {other} = {getattr(self, other)!r}"
+            )
 
 
 def section(alpha: float, beta: float) -> Section:

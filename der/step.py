@@ -22,6 +22,7 @@ from der.equilibrium import (
     Control,
     Direction,
     Equilibrium,
+    Outcome,
     dot,
     equilibrium,
     moved,
@@ -31,6 +32,7 @@ from der.rod import State
 from der.sector import Sector
 
 ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
+_ELSEWHERE = 1e-6  # of s: no rounding leads so far, but a mode without stiffness does
 _LAST = 1e-9  # of s: a correction this small leaves the next one, its square, below `ROOT`
 _GAIN = 0.5  # of a value: a round that leaves more of it is one that Brent's method does better
 _APART = 0.1  # of a step: states that lie closer would tell more of rounding than of the path
@@ -259,15 +261,23 @@ class Step:
     def as_is(self, s: float, state: State) -> Equilibrium:
         """A ``state`` at ``s`` as the equilibrium that it is to the tolerance, not moved.
 
-        At a branch point Newton's method would move it along the mode that has no stiffness.
+        At a branch point Newton's method would move it along the mode that has no stiffness. Where
+        rounding leaves more than the tolerance it is tried all the same, but not believed if it
+        leads elsewhere.
 
         Raises
         ------
         Stuck
-            Where it is none and Newton's method, tried then, fails.
+            Where the state is none and Newton's method, tried then, fails.
         """
         found = self._newton(state, Control.DIRECTION, iterations=0)
-        return found if found.converged else self.polished(s, state)
+        if found.converged:
+            return found
+        moved_on = self.polished(s, state)
+        away = self.between(state, moved_on.state)
+        if dot(self.piece.body, away, away) < _ELSEWHERE**2:
+            return moved_on
+        return replace(found, outcome=Outcome.CONVERGED)
 
     def polished(self, s: float, guess: State, control: Control = Control.DIRECTION) -> Equilibrium:
         """The equilibrium next to a ``guess`` at ``s``.

@@ -110,6 +110,14 @@ def test_scale_does_not_tell_height_from_thickness():
         (lambda: rectangular_section(1e-200), "alpha must be a finite number > 0, got inf"),
         (lambda: rectangular_section(4, nu=0.51), "nu must be a number in (-1, 0.5], got 0.51"),
         (lambda: rectangular_section(4, nu=-1), "nu must be a number in (-1, 0.5], got -1"),
+        (
+            lambda: section(1e-6, 2e4),
+            "alpha must be such that alpha, beta and 1 are within a factor",
+        ),
+        (
+            lambda: section(1.0, 1e-11),
+            "beta must be such that alpha, beta and 1 are within a factor",
+        ),
         (lambda: section(0, 1), "alpha must be a finite number > 0, got 0"),
         (lambda: section(1, None), "beta must be a finite number > 0, got None"),
         (lambda: Section(1, 1, nu=2), "nu must be a number in (-1, 0.5], got 2"),

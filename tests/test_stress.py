@@ -93,6 +93,27 @@ def test_file_and_progress(tmp_path):
     assert str(found).startswith("3 cases in ")
 
 
+@pytest.mark.parametrize(
+    ("kappa0", "h_over_t", "wants"),
+    [
+        (4.0, 0.5080407396020141, {"n_edges": 16, "tolerance": 1.9026890015305905e-15}),
+        (
+            -2.0,
+            4.116276733018586,
+            {"n_edges": 32, "curvature": "tangent", "tolerance": 1.0047980497316619e-16},
+        ),
+    ],
+)
+def test_tolerances_that_rounding_cannot_meet_beside_branch_points(kappa0, h_over_t, wants):
+    """Branch points stay on the path, and a path that cannot go on says why."""
+    ring = {"shape": "circle", "natural_curvature": kappa0, "twist_axis": "x"}
+    wants = {"sector": "full", **wants}
+    case = Case(
+        "natural curvature", {"ring": ring, "h_over_t": h_over_t, "nu": 0.3, "wants": wants}
+    )
+    assert [failure for failure in suite.repeat(case) if not failure.explained] == []
+
+
 def test_workers_find_the_same(summary):
     """Two processes, the same cases in the same order, the same failures."""
     shared = silent(count=SOME, seed=3, workers=2)

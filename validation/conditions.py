@@ -49,6 +49,7 @@ class Value(NamedTuple):
     at: Solution
     system: Collocation
     psi: Array | None = None  # of an exchange, see `exchanges`: its state has no tangent
+    bend: Array | None = None  # likewise
     way: Array | None = None  # of an infinite slope, see `folded_states`: across the boundary
     place: Array | None = None  # likewise: on the boundary, of which the state is
 
@@ -214,10 +215,11 @@ def exchange(scene: Scene, seed: Value) -> Value:
 
 def _exchanged(system: Collocation, mesh: Mesh, frames: Array, seed: Value) -> Value:
     """The centre of an exchange, from frames on this mesh."""
-    found = centre(system, mesh, frames, np.append(seed.at.p, seed.at.gamma), seed.psi)
+    x = np.append(seed.at.p, seed.at.gamma)
+    found = centre(system, mesh, frames, x, seed.psi, seed.bend)
     if found is None:
         raise Lost("no two branches nearby")
-    return Value(found.mu, _state(system, mesh, found), system, found.psi)
+    return Value(found.mu, _state(system, mesh, found), system, found.psi, bend=found.bend)
 
 
 def _state(system: Collocation, mesh: Mesh, found: Centre) -> Solution:

@@ -49,6 +49,7 @@ class Centre(NamedTuple):
     x: Array  # (n_p + 1,) p, gamma
     psi: Array  # (n_p,)
     mu: float
+    bend: Array  # (n_p + 1, n_p + 1) of psi^T G by x, about
 
 
 @njit(cache=True)
@@ -109,13 +110,19 @@ def shot(system: Collocation, mesh: Mesh, frames: Array, x: Array) -> Shot:
 
 
 def centre(
-    system: Collocation, mesh: Mesh, frames: Array, x: Array, psi: Array | None = None
+    system: Collocation,
+    mesh: Mesh,
+    frames: Array,
+    x: Array,
+    psi: Array | None = None,
+    bend: Array | None = None,
 ) -> Centre | None:
     """Where G = mu psi and psi^T G_x = 0, from a state nearby; None where there is none.
 
     Parameters
     ----------
     psi : from a ring nearby, which gives it its sign; else the left singular vector of G_x.
+    bend : from a ring nearby, which serves as long as Newton's steps are small.
     """
     start = x
     here = shot(system, mesh, frames, x)
@@ -125,10 +132,10 @@ def centre(
         psi = np.linalg.svd(here.rates)[0][:, -1]
     mu = float(psi @ here.missed)
     n_p = len(psi)
-    bend, size = None, np.inf
+    size = 0.0
     for _ in range(MOST):
-        if size > NEAR:  # nearer, second derivatives of before do
-            bend = _bend(system, mesh, here, x, psi)
+        if bend is None or size > NEAR:  # nearer, second derivatives of before do
+            bend = _bend(system, mesh, here, x, psi, sides=(1.0, 0.0))
         if bend is None:
             return None
         # unknowns x, psi, mu
@@ -152,7 +159,7 @@ def centre(
         if not here.ok:
             return None
         if size < CONVERGED:
-            return Centre(here, x, psi, mu)
+            return Centre(here, x, psi, mu, bend)
     return None
 
 
@@ -176,14 +183,23 @@ def hysteresis(system: Collocation, mesh: Mesh, frames: Array, x: Array, psi: Ar
     return float(still @ bend[:-1, :-1] @ still)
 
 
-def _bend(system: Collocation, mesh: Mesh, here: Shot, x: Array, psi: Array) -> Array | None:
-    """Second derivatives of psi^T G by x, by central differences of its first; symmetric."""
+def _bend(
+    system: Collocation,
+    mesh: Mesh,
+    here: Shot,
+    x: Array,
+    psi: Array,
+    sides: tuple[float, float] = (1.0, -1.0),
+) -> Array | None:
+    """Second derivatives of psi^T G by x, by differences of its first; symmetric."""
     out = np.empty((len(x), len(x)))
     for k in range(len(x)):
         step = np.zeros_like(x)
         step[k] = DIFFERENCE * (1.0 + abs(x[k]))
-        ahead, behind = (shot(system, mesh, here.frames, x + s * step) for s in (1.0, -1.0))
+        ahead, behind = (
+            shot(system, mesh, here.frames, x + side * step) if side else here for side in sides
+        )
         if not (ahead.ok and behind.ok):
             return None
-        out[k] = psi @ (ahead.rates - behind.rates) / (2.0 * step[k])
+        out[k] = psi @ (ahead.rates - behind.rates) / ((sides[0] - sides[1]) * step[k])
     return 0.5 * (out + out.T)
