@@ -32,6 +32,7 @@ from der.rod import State
 from der.sector import Sector
 
 ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
+_ASTRAY = 0.2  # of a step: states that lie farther from its curve are on another branch
 _ELSEWHERE = 1e-6  # of s: no rounding leads so far, but a mode without stiffness does
 _LAST = 1e-9  # of s: a correction this small leaves the next one, its square, below `ROOT`
 _GAIN = 0.5  # of a value: a round that leaves more of it is one that Brent's method does better
@@ -155,15 +156,21 @@ class Step:
         Raises
         ------
         Stuck
-            Where Newton's method fails although both ends of the step are equilibria.
+            Where Newton's method fails, or leads to another branch, although both ends of the step
+            are equilibria.
         """
         if s == 0.0:
             return self.start
         if s == self.length:
             return self.end
         if s not in self._found:
-            self._found[s] = self.polished(s, self.expected(s))
-            self._keep(s, self._found[s].state)
+            expected = self.expected(s)
+            found = self.polished(s, expected)
+            away = self.between(expected, found.state)
+            if dot(self.piece.body, away, away) > (_ASTRAY * self.length) ** 2:
+                raise self._stuck(expected, s, Outcome.DIVERGED)
+            self._found[s] = found
+            self._keep(s, found.state)
         return self._found[s]
 
     def change(
@@ -289,11 +296,14 @@ class Step:
         """
         found = self._newton(guess, control)
         if not found.converged:
-            raise Stuck(
-                f"no equilibrium within a step, at gamma = {guess.load:.6f}"
-                f" (s = {s:.3g} of {self.length:.3g}): {ADVICE[found.outcome]}"
-            )
+            raise self._stuck(guess, s, found.outcome)
         return found
+
+    def _stuck(self, guess: State, s: float, outcome: Outcome) -> Stuck:
+        return Stuck(
+            f"no equilibrium within a step, at gamma = {guess.load:.6f}"
+            f" (s = {s:.3g} of {self.length:.3g}): {ADVICE[outcome]}"
+        )
 
     def _newton(self, guess: State, control: Control, iterations: int = 12) -> Equilibrium:
         found = equilibrium(
