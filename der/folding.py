@@ -29,7 +29,7 @@ from der.sites import sites
 from der.special import EIGHTH, Visit, Wanted, full_index, three_covered
 from der.stability import all_modes, index
 from der.step import Stuck, Tally
-from der.unfinished import Interrupted, NotConverged, interrupts_between_states
+from der.unfinished import STOPPED, Interrupted, NotConverged, interrupts_between_states
 
 _NO_MOMENT = 1e-6  # of the largest |M|: a state of rest
 _KEPT = 64  # configurations of a snap for N gradients; it takes about 5 N
@@ -89,8 +89,8 @@ def fold(
         timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
         return _entries(scene, piece, visits, timing, status, message)
 
-    try:
-        with interrupts_between_states() as pressed:
+    with interrupts_between_states() as pressed:
+        try:
             _load_kernels(wanted.stability, wanted.contacts, snaps=scene.control != "arclength")
             started = time.perf_counter()
             for visit in _march(scene, piece, wanted, tally):
@@ -101,15 +101,21 @@ def fold(
                     watch(piece.shape(visit.at.state)[0])
                 if pressed:
                     raise KeyboardInterrupt
-    except Stuck as stuck:
-        raise NotConverged(str(stuck), Path(**entries("not converged", str(stuck)))) from None
-    except KeyboardInterrupt:
-        raise Interrupted(Path(**entries("interrupted", "stopped by the user"))) from None
-    message = NEVER if visits[-1].at.state.load == -scene.gamma_max else ""
-    if scene.error_bars:
-        found = _with_error_bars(scene, piece, wanted, visits, lambda: entries("done", message))
-        return Path(**found)
-    return Path(**entries("done", message))
+            message = NEVER if visits[-1].at.state.load == -scene.gamma_max else ""
+
+            def done() -> dict[str, Any]:
+                return entries("done", message)
+
+            bars = scene.error_bars
+            found = _with_error_bars(scene, piece, wanted, visits, done) if bars else done()
+        except Stuck as stuck:
+            raise NotConverged(str(stuck), Path(**entries("not converged", str(stuck)))) from None
+        except KeyboardInterrupt:
+            pressed.clear()  # one more must not lose what there is
+            raise Interrupted(Path(**entries("interrupted", STOPPED))) from None
+        if pressed:  # while the record was made
+            raise Interrupted(Path(**found | {"status": "interrupted", "message": STOPPED}))
+    return Path(**found)
 
 
 def _piece(scene: Scene, n_edges: int, name: str) -> Sector:

@@ -28,12 +28,11 @@ from der.shapes import Shapes
 from der.sites import sites
 from der.special import Visit, Wanted, full_index, three_covered, visit
 from der.step import Stuck, Tally
-from der.unfinished import interrupts_between_states
+from der.unfinished import STOPPED, interrupts_between_states
 from der.unfolding import shapes
 
 FARTHEST = 2.0 * math.pi  # rad; a path that gets there unfolded, or to its negative, does not fold
 _MOST_STEPS = 600  # rings that fold do so in less than 150
-STOPPED = "stopped by the user"
 _NO_WELL = "the folded ring is no well: it opens by itself when its grips turn freely"
 _KINDS = ("fold", "limit", "branch")
 

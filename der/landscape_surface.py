@@ -33,7 +33,7 @@ from der.special import Visit, Wanted
 from der.stability import index
 from der.step import Stuck, Tally
 from der.supports import Supports
-from der.unfinished import interrupts_between_states
+from der.unfinished import STOPPED, interrupts_between_states
 
 STRETCHED = 0.97  # of half the ring's length: beyond, closing conditions lose their rank
 _CEILING = 1.5  # of the path's largest energy: other minima that lie higher are of no interest
@@ -110,7 +110,7 @@ def surface(
         spread(flood, shaken(flood, _SHAKES), pressed, progress)
         fallen = _snaps(piece, wanted, angles, pressed) if snaps else ()
     status = "interrupted" if pressed else "done"
-    message = "stopped by the user" if pressed else message
+    message = STOPPED if pressed else message
     folds = line[[k for k, one in enumerate(visits) if one.kind == "fold"]]
     return Surface(
         scene.ring.to_json(),

@@ -26,7 +26,7 @@ from der.planar_ring import PlanarRing, covered, planar_ring, shapes
 from der.planar_rod import Array, PlanarRod
 from der.planar_states import check_planar, coarser, planar_numerics
 from der.scene import Scene
-from der.unfinished import interrupts_between_states
+from der.unfinished import STOPPED, interrupts_between_states
 
 _THERE = 1e-9  # of the distance: the flat ring is where it should go
 _SAME = 0.3  # rad: a state on another mesh that is further away is another state
@@ -66,7 +66,7 @@ def squeeze(scene: Scene, distance: float = 0.0) -> Squeeze:
             for stop in track.path(goal):
                 stops.append(stop)
                 if pressed:
-                    status, message = "interrupted", "stopped by the user"
+                    status, message = "interrupted", STOPPED
                     break
         except Lost as lost:
             status, message = "not converged", f"{lost} a between the points"

@@ -27,7 +27,7 @@ from der.planar_record import FOLDED, PlanarState, PlanarStates
 from der.planar_ring import PlanarRing, covered, eight, planar_ring, shapes, shifted
 from der.planar_rod import Array, negative_planar
 from der.scene import Scene, meshes, sector_name
-from der.unfinished import interrupts_between_states
+from der.unfinished import STOPPED, interrupts_between_states
 
 MOST = 12  # turns
 _TURNS = 3
@@ -80,7 +80,7 @@ def planar(scene: Scene, *, turns: int | None = None) -> PlanarStates:
                 break
         found.sort(key=lambda one: one.at.energy)
         rows, kept = _distinct([_described(scene, mesh, one) for one in found])
-    status, message = ("interrupted", "stopped by the user") if pressed else ("done", "")
+    status, message = ("interrupted", STOPPED) if pressed else ("done", "")
     if not found and not pressed:
         status, message = "not converged", "no state was found from any start; use more edges"
     return PlanarStates(

@@ -34,7 +34,7 @@ from der.states_images import Images, images
 from der.states_measures import described, names
 from der.states_record import States, Transition
 from der.states_starts import free_starts, gripped_starts
-from der.unfinished import interrupts_between_states
+from der.unfinished import STOPPED, interrupts_between_states
 
 MOST = 200  # states that may be asked for
 WAYS = 8  # down, at most: states with more are counted and left out
@@ -84,7 +84,7 @@ def states(
                 break
     found = record(scene, whole, search, gamma)
     if pressed:
-        found = replace(found, status="interrupted", message="stopped by the user")
+        found = replace(found, status="interrupted", message=STOPPED)
     elif not len(found):
         message = f"no state was found from any start{_flat(whole, scene.tolerance)}"
         found = replace(found, status="not converged", message=message)

@@ -15,6 +15,9 @@ if TYPE_CHECKING:  # which takes long to load
     from der.record import Path
 
 
+STOPPED = "stopped by the user"
+
+
 class NotConverged(RuntimeError):
     """A path that could not be followed to its end.
 

@@ -143,6 +143,28 @@ def test_ctrl_c_does_not_wait_for_modes():
     assert shapes.softest is None
 
 
+@pytest.mark.parametrize("presses", [1, 2])
+def test_ctrl_c_among_the_error_bars_keeps_the_path(presses, monkeypatch):
+    """Once: they are finished. Twice: the path is handed over without them."""
+    from der import error_bars
+
+    true = error_bars.error_bars
+
+    def pressing(*args, **more):
+        for _ in range(presses):
+            signal.raise_signal(signal.SIGINT)
+        return true(*args, **more)
+
+    monkeypatch.setattr(error_bars, "error_bars", pressing)
+    scene = der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=32, error_bars=True)
+    with pytest.raises(der.Interrupted) as stopped:
+        der.fold(scene)
+    part = stopped.value.path
+    assert part.status == "interrupted"
+    assert part.gamma[-1] == math.pi
+    assert (part.error is None) is (presses == 2)
+
+
 def test_ctrl_c_is_a_keyboard_interrupt():
     """So that a program that knows nothing of us still stops."""
     with pytest.raises(KeyboardInterrupt):

@@ -18,7 +18,7 @@ from der.scene import Scene
 from der.sections import section
 from der.shapes import Shapes
 from der.sites import sites
-from der.unfinished import Interrupted, NotConverged, interrupts_between_states
+from der.unfinished import STOPPED, Interrupted, NotConverged, interrupts_between_states
 from validation.collocation import Collocation, Solution, collocation
 from validation.continuation import Stuck, Tally, Visit, Wanted, follow
 from validation.sectors import sector
@@ -28,7 +28,6 @@ TOLERANCE = 1e-8
 FINEST, COARSEST = 1e-11, 1e-3
 ACROSS = 0.4  # of the tolerance: errors across the path, which at equal gamma show larger
 _FLAT = 1e-6  # out-of-plane extent of a folded ring, a
-STOPPED = "stopped by the user"
 HOW = (
     "change of the state, across the path, on a collocation mesh of half the intervals' length; "
     "Gauss collocation of 4 stages, of order 8 at the ends of intervals"
