@@ -130,7 +130,7 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
     """
     (i, _), (j, _) = nearest(u, one.places), nearest(u, other.places)
     firsts, seconds = one.points[i : i + 2], other.points[j : j + 2]
-    if any(_same(a.state, b.state) for a, b in product(firsts, seconds)):
+    if any(same(a.state, b.state) for a, b in product(firsts, seconds)):
         return None  # they touch, or are one: polygons cross there by chance
 
     def pairs() -> Iterator[tuple[At[Value], At[Value]]]:
@@ -169,7 +169,7 @@ def _has(line: Line, met: Met) -> bool:
     if nearest(met.first.u, line.places)[1] > ASIDE and min(apart[0], apart[-1]) > BESIDE:
         return False
     near = [at for at, far in zip(line.points, apart, strict=True) if far < BESIDE]
-    return any(_same(at.state, met.second.state, LIKE) for at in near)
+    return any(same(at.state, met.second.state, LIKE) for at in near)
 
 
 def _once(met: Met, found: list[Met]) -> Met:
@@ -204,7 +204,7 @@ def _touching(line: Line, value: Callable[[Value], float]) -> list[int]:
     return [k for k in range(len(values) - 2, -1, -1) if values[k] * values[k + 1] < 0.0]
 
 
-def _same(one: Value, other: Value, within: float = DIFFERENT) -> bool:
+def same(one: Value, other: Value, within: float = DIFFERENT) -> bool:
     """Whether two states are about the same."""
     return abs(one.at.gamma - other.at.gamma) + abs(one.at.moment - other.at.moment) < within
 

@@ -7,12 +7,13 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from validation.corners import Line
+from validation.corners import CUSP, LIKE, Line, same
 from validation.gauss import Array
-from validation.polygons import distance, meetings
+from validation.polygons import meetings, nearest
 
 BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for,
 CLOSEST = 3e-5  # and beside one with another near it, at least: nearer, labels do not tell
+CLOSEST_CUSP = 2e-4  # likewise: beside a cusp its two folds differ by the distance to the power 3/2
 SAME_CURVE = 1e-3  # of the side: above what chords leave of a curve
 CROWDED = 2e-4  # likewise: points nearer to each other than this have one pair of labels
 
@@ -51,17 +52,25 @@ def beside(line: Line, k: int, lines: Iterable[Line]) -> list[Array]:
     places = line.places
     way = places[min(k + 1, len(places) - 1)] - places[max(k - 1, 0)]
     normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
-    free = math.inf
-    for other in lines:
-        away = distance(places[k], other.places)
-        # a curve of the same kind that is nearer than that is the same one, followed twice
-        if other.kind != line.kind or (other is not line and away > SAME_CURVE):
-            free = min(free, away)
+    free = min(
+        (_away(line, k, other) for other in lines if other is not line),
+        default=math.inf,
+    )
     free = min(free, *(_own(places, k, sign * BESIDE * normal) for sign in (1.0, -1.0)))
     reach = min(BESIDE, 0.3 * free)
-    if reach < CLOSEST:
+    if reach < (CLOSEST_CUSP if line.kind == CUSP else CLOSEST):
         return []
     return [np.clip(places[k] + sign * reach * normal, 0.0, 1.0) for sign in (1.0, -1.0)]
+
+
+def _away(line: Line, k: int, other: Line) -> float:
+    """How far another curve is from a curve's k-th point; inf: it is the same, followed twice."""
+    j, away = nearest(line.places[k], other.places)
+    if other.kind == line.kind and away < SAME_CURVE:
+        states = [at.state for at in other.points[j : j + 2]]
+        if any(same(line.points[k].state, state, LIKE) for state in states):
+            return math.inf
+    return away
 
 
 def _own(places: Array, k: int, way: Array) -> float:
