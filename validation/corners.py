@@ -10,9 +10,9 @@ touches that of exchanges where gamma is stationary along an asymptote of the pa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import chain, combinations, product
 
 import numpy as np
 
@@ -48,7 +48,7 @@ BESIDE = 0.02  # of the side: a curve that ends so near to a corner on it ends t
 ASIDE = 2.5e-3  # of the side: what a chord of a curve is off at most
 SAME = 1e-6  # of the side: two corners so near are one
 DIFFERENT = 0.05  # gamma and M of states that are not the same, together
-LIKE = 0.5  # likewise, of those on a curve that ends in a corner: they change with a root there
+LIKE = 1.0  # likewise, of those on a curve that ends in a corner: they change with a root there
 MOST = 20
 STEPS = 8  # along the side of a polygon
 
@@ -103,11 +103,16 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
     for (kind, touched), value in TOUCHING.items():
         for line in [line for line in lines if line.kind == kind]:
             for k in _touching(line, value):
-                u = 0.5 * (line.points[k].u + line.points[k + 1].u)
-                seeds = (line.points[k].state,) * 2
-                try:
-                    met = _solved((kind, touched), u, seeds, condition, value)
-                except Lost:
+                ends = line.points[k : k + 2]
+                u = 0.5 * (ends[0].u + ends[1].u)
+                met = None
+                for at in _starts(ends, u, condition(kind)):
+                    try:
+                        met = _solved((kind, touched), u, (at.state,) * 2, condition, value)
+                        break
+                    except Lost:
+                        continue
+                if met is None:
                     continue
                 kinds = (*met.kinds, CUSP) if kind == "infinite slope" else met.kinds
                 met = _once(replace(met, kinds=kinds), found)
@@ -133,15 +138,13 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
     if any(same(a.state, b.state) for a, b in product(firsts, seconds)):
         return None  # they touch, or are one: polygons cross there by chance
 
-    def pairs() -> Iterator[tuple[At[Value], At[Value]]]:
-        yield from product(firsts, seconds)
-        led = [
-            [_led(condition(line.kind), at, u) for at in ends]
-            for line, ends in ((one, firsts), (other, seconds))
-        ]
-        yield from product(*([at for at in ends if at is not None] for ends in led))
+    def led() -> Iterator[tuple[At[Value], At[Value]]]:
+        yield from product(
+            list(_led(firsts, u, condition(one.kind))),
+            list(_led(seconds, u, condition(other.kind))),
+        )
 
-    for first, second in pairs():
+    for first, second in chain(product(firsts, seconds), led()):
         seeds = first.state, second.state
         try:
             met = _solved((one.kind, other.kind), u, seeds, condition)
@@ -152,15 +155,22 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
     return None
 
 
-def _led(condition: Function[Value], at: At[Value], u: Array) -> At[Value] | None:
-    """A curve's point near ``u``, by short steps from another; None where it is lost."""
-    start = at.u
-    try:
-        for k in range(1, STEPS + 1):
-            at = corrected(condition, start + (u - start) * k / STEPS, at.state)
-    except Lost:
-        return None
-    return at
+def _starts(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Iterator[At[Value]]:
+    """Points of a curve from which one near ``u`` is looked for, the dear ones last."""
+    yield from ends
+    yield from _led(ends, u, condition)
+
+
+def _led(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Iterator[At[Value]]:
+    """The curve's point near ``u``, by short steps from others; none where it is lost."""
+    for at in ends:
+        start = at.u
+        try:
+            for k in range(1, STEPS + 1):
+                at = corrected(condition, start + (u - start) * k / STEPS, at.state)
+        except Lost:
+            continue
+        yield at
 
 
 def _has(line: Line, met: Met) -> bool:
