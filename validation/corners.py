@@ -48,7 +48,7 @@ BESIDE = 0.02  # of the side: a curve that ends so near to a corner on it ends t
 ASIDE = 2.5e-3  # of the side: what a chord of a curve is off at most
 SAME = 1e-6  # of the side: two corners so near are one
 DIFFERENT = 0.05  # gamma and M of states that are not the same, together
-LIKE = 1.0  # likewise, of those on a curve that ends in a corner: they change with a root there
+LIKE = 0.5  # likewise, of those on a curve that ends in a corner: they change with a root there
 MOST = 20
 STEPS = 8  # along the side of a polygon
 
