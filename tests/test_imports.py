@@ -157,6 +157,7 @@ BENCHES = {
     "bench_stepping",
     "bench_sweep",
     "stress",
+    "stress_kinds",
 }
 
 

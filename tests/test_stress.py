@@ -15,6 +15,7 @@ import der
 from der.equilibrium import ADVICE, Outcome
 from validation import stress as suite
 from validation import stress_checks
+from validation import stress_kinds as kinds
 from validation.random_rings import DENSE
 from validation.stress_cases import KINDS, Case, case_from_json, cases, noisy_points, scene_of
 from validation.stress_inputs import Argument, arguments, refusal
@@ -157,7 +158,7 @@ def test_what_is_no_case_is_refused(entries):
 @pytest.mark.parametrize(
     ("wrong", "reason", "explained"),
     [
-        (suite._Refused("r_over_a must be a number, got 3"), "ValueError: r_over_a must be", True),
+        (kinds.Refused("r_over_a must be a number, got 3"), "ValueError: r_over_a must be", True),
         (ValueError("no"), "ValueError: no [unexpected]", False),
         (ZeroDivisionError("float division"), "ZeroDivisionError: float division", False),
         (RuntimeWarning("overflow"), "RuntimeWarning: overflow", False),
@@ -172,7 +173,7 @@ def test_reasons_of_exceptions(monkeypatch, wrong, reason, explained):
         raise wrong
         yield
 
-    monkeypatch.setitem(suite._RUN, "path", run)
+    monkeypatch.setitem(kinds.RUN, "path", run)
     (failure,) = suite.repeat(Case("path", {}))
     assert failure.reason.startswith(reason)
     assert failure.explained is explained
@@ -253,7 +254,7 @@ def test_what_takes_too_long_is_no_answer(monkeypatch):
         while True:
             yield from ()
 
-    monkeypatch.setitem(suite._RUN, "path", run)
+    monkeypatch.setitem(kinds.RUN, "path", run)
     monkeypatch.setattr(suite, "TIME_LIMIT", 0.05)
     (failure,) = suite.repeat(Case("path", {}))
     assert failure.reason == "TimeoutError: no answer within # s [unexpected]"
@@ -267,7 +268,7 @@ def test_a_warning_is_a_failure(monkeypatch):
         np.float64(1.0) / np.float64(0.0)
         yield "not", "reached"
 
-    monkeypatch.setitem(suite._RUN, "path", run)
+    monkeypatch.setitem(kinds.RUN, "path", run)
     (failure,) = suite.repeat(Case("path", {}))
     assert failure.reason.startswith("FloatingPointError")
 
@@ -279,7 +280,7 @@ def test_a_good_path_has_no_faults(bar):
     """Neither in the record nor in its balance, and energy is work."""
     scene, path = bar
     assert not list(stress_checks.faults(scene, path))
-    assert not list(suite._balance(scene, path, path.shapes))
+    assert not list(kinds.balance(scene, path, path.shapes))
     assert stress_checks.work_lost(path) < 1e-3
 
 
@@ -342,7 +343,7 @@ def test_a_state_out_of_balance_is_seen(bar):
     """Frames of one state with the gamma, moment and energy of its neighbour."""
     scene, path = bar
     shapes = replace(path.shapes, x=path.shapes.x[::-1], frames=path.shapes.frames[::-1])
-    found = names(suite._balance(scene, path, shapes))
+    found = names(kinds.balance(scene, path, shapes))
     assert {"energy of the full ring", "moment of the full ring"} <= found
 
 
@@ -367,8 +368,8 @@ def test_values_outside_error_bars_are_seen():
     """The reference against error bars that are too small by far."""
     scene = der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=32, error_bars=True)
     path = der.fold(scene)
-    reference = suite.solve(scene, tolerance=1e-9)
-    assert not list(stress_checks.outside_error_bars(path, reference, suite.TIMES))
+    reference = kinds.solve(scene, tolerance=1e-9)
+    assert not list(stress_checks.outside_error_bars(path, reference, kinds.TIMES))
     assert list(stress_checks.outside_error_bars(path, reference, 1e-6))
 
 
