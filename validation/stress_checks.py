@@ -306,7 +306,10 @@ def _at_a_turn(path: Path, gamma: float) -> bool:
 
 
 def outside_error_bars(rod: Path, reference: Path, times: float) -> Iterator[Fault]:
-    """Where the other solver's values lie outside ``times`` the sum of both errors."""
+    """Where the other solver's values lie outside ``times`` the sum of both errors.
+
+    Where the rod knows no error it claims nothing, neither values nor how many states there are.
+    """
     tables = [_at_equal_gamma(path) for path in (rod, reference)]
     errors: list[Any] = [rod.error, reference.error]
     for name in ("moment", "energy"):
@@ -314,7 +317,8 @@ def outside_error_bars(rod: Path, reference: Path, times: float) -> Iterator[Fau
         for gamma in sorted(set(tables[0]) & set(tables[1])):
             places = [table[gamma] for table in tables]
             if len(places[0]) != len(places[1]):
-                if not _at_a_turn(reference, gamma):
+                sure = all(errors[0][name][i] is not None for i in places[0])
+                if sure and not _at_a_turn(reference, gamma):
                     yield "other states", f"{len(places[0])}, {len(places[1])} at gamma = {gamma}"
                 continue
             for i, k in zip(*places, strict=True):
