@@ -373,6 +373,24 @@ def test_values_outside_error_bars_are_seen():
     assert list(stress_checks.outside_error_bars(path, reference, 1e-6))
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_state_too_few_is_seen_where_errors_are_known(known):
+    """Where they are null the rod has claimed nothing."""
+    scene = der.Scene(der.circle(), der.rectangular_section(1.6), n_edges=64, error_bars=True)
+    reference = kinds.solve(replace(scene, save_at=(2.7,)), tolerance=1e-9)
+    one = der.fold(replace(scene, save_at=(2.7,)))
+    states = [k for k, gamma in enumerate(one.gamma) if gamma == 2.7]
+    assert len(states) == 3
+    moved = one.gamma.copy()
+    moved[states[-1]] += 1e-3  # no longer at 2.7
+    errors = dict(one.error)
+    if not known:
+        errors |= {name: [None] * len(one) for name in ("moment", "energy")}
+    few = replace(one, gamma=moved, error=errors)
+    found = list(stress_checks.outside_error_bars(few, reference, kinds.TIMES))
+    assert bool(found) is known
+
+
 def test_input_that_is_taken_but_must_not_be_is_seen():
     """And a refusal that names nothing, and one in many lines."""
 
