@@ -143,7 +143,7 @@ def merged(step: Step, found: Sequence[Change]) -> list[Change]:
         else:
             groups.append([one])
     return [
-        replace(same[0], s=group[0].s, by=total)
+        replace(same[0], s=group[0].s, at=group[0].at, by=total)
         for group in groups
         for same in ([one for one in group if one.c == c] for c in sorted({o.c for o in group}))
         if (total := sum(one.by for one in same))

@@ -57,7 +57,8 @@ class Section:
         for name, number in checked.items():
             object.__setattr__(self, name, number)
         if not max(self.alpha, self.beta, 1.0) <= SPREAD * min(self.alpha, self.beta, 1.0):
-            name, other = ("alpha", "beta") if self.alpha < self.beta else ("beta", "alpha")
+            farther = abs(math.log(self.alpha)) >= abs(math.log(self.beta))
+            name, other = ("alpha", "beta") if farther else ("beta", "alpha")
             raise ValueError(
                 f"{name} must be such that alpha, beta and 1 are within a factor of {SPREAD:g}, "
                 f"got {getattr(self, name)!r} and {other} = {getattr(self, other)!r}"

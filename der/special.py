@@ -214,6 +214,8 @@ def _at_targets(
             if load == low:
                 continue
             s, at = (s1, b) if load == high else step.at_load(load, s0, s1)
+            if marks:  # loads may lie closer than places can be told
+                s = max(s, marks[-1].s)
             marks.append(_Mark(s, visit(piece, wanted, at)))
             if abs(load) == wanted.load_max:  # also of a path that has turned back for good
                 return marks, True
