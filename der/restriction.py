@@ -2,8 +2,8 @@
 
 Frames sit on the same material points at every resolution, so every second frame of a state is
 nearly a state on half the edges. What is missing is called its *offset*. Offsets change little from
-one state of a path to the next, and are about four times as large from mesh to mesh: Newton's
-method starts from the offset expected, which bare frames are sometimes too far from.
+one state of a path to the next, and are about four times as large from mesh to mesh: where bare
+frames are too far from their state, Newton's method starts from the offset expected.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ def _level(
 ) -> Level | None:
     """The state of ``piece`` in the plane normal to rates ``q`` (n, b) and ``load``.
 
-    Tried from the offset ``expected``, then from bare frames. ``beyond`` is that of the finer mesh.
+    Tried from bare frames, then from the offset ``expected``, which may lead beside the plane.
+    ``beyond`` is that of the finer mesh.
     """
     own = finer.but(
         quat=np.ascontiguousarray(finer.quat[::2]),
@@ -98,7 +99,7 @@ def _level(
         rates = Direction(q, np.zeros(len(own.force)), load)
         # offsets of another state may lie beside this plane by a little
         away = dot(piece.body, row, expected) / dot(piece.body, row, rates)
-        starts.insert(0, moved(piece.held, own, _sum(expected, rates, -away)))
+        starts.append(moved(piece.held, own, _sum(expected, rates, -away)))
     for start in starts:
         at = equilibrium(
             piece.body,
