@@ -14,6 +14,7 @@ import pytest
 import der
 from validation import (
     bench,
+    bench_cold,
     bench_elastica,
     bench_methods,
     bench_needs,
@@ -41,6 +42,7 @@ TINY = bench.Extent(
     orders=(32, 64),
     scales=(16, 32),
     commands=1,
+    cold=False,
 )
 
 
@@ -161,6 +163,30 @@ def test_start_up_is_not_measured_of_a_command_that_fails(monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(subprocess.CalledProcessError):
         list(bench_paths.start_up(1))
+
+
+def test_compiling_is_charged_to_the_kernel_itself():
+    """What a kernel calls is taken off; a second signature is added; the costliest comes first."""
+    told = [
+        ("outer", 0.0, True),
+        ("inner", 1.0, True),
+        ("inner", 4.0, False),
+        ("other", 4.0, True),
+        ("inner", 4.5, True),
+        ("inner", 5.5, False),
+        ("other", 6.0, False),
+        ("outer", 8.0, False),
+    ]
+    found = bench_cold.own_times(bench_cold.Told(*one) for one in told)
+    assert found == [("inner", 2, 4.0), ("outer", 1, 3.0), ("other", 1, 1.0)]
+
+
+def test_cold_start_has_rows():
+    """A command in a process of its own, which tells of its kernels: here one without any."""
+    rows = list(bench_cold.rows(("--help",)))
+    assert {row.group for row in rows} == {"start-up"}
+    assert [row.value for row in rows[2:]] == [0.0, 0.0]
+    assert all(row.value > 0.0 for row in rows[:2])
 
 
 def test_needs_have_a_row_each(monkeypatch):

@@ -144,6 +144,7 @@ ROOM = {module: room for room, modules in ROOMS.items() for module in modules}
 BENCHES = {
     "bench",
     "bench_cited",
+    "bench_cold",
     "bench_elastica",
     "bench_methods",
     "bench_needs",

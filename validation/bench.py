@@ -21,6 +21,7 @@ from pathlib import Path
 from der.checks import shown
 from der.files import write_whole
 from validation import (
+    bench_cold,
     bench_elastica,
     bench_needs,
     bench_orders,
@@ -63,6 +64,7 @@ class Extent:
     swept: int = 1000
     sample: int = 40
     commands: int = 5
+    cold: bool = True  # also what compiling takes
 
 
 FULL = Extent()
@@ -80,6 +82,7 @@ QUICK = Extent(
     swept=50,
     sample=4,
     commands=2,
+    cold=False,
 )
 
 
@@ -171,7 +174,7 @@ def measure(
         "state": _state,
         "scaling": _scaling,
         "sweep": lambda e: bench_sweep.rows(e.swept, e.sample),
-        "start": lambda e: bench_paths.start_up(e.commands),
+        "start": _start,
     }
     for part in PARTS:
         if part in only:
@@ -254,6 +257,12 @@ def _scaling(extent: Extent) -> Iterator[Scale | Row]:
         measured = scale(n, min(extent.repeats, 5))
         yield measured
         yield from measured.rows()
+
+
+def _start(extent: Extent) -> Iterator[Row]:
+    yield from bench_paths.start_up(extent.commands)
+    if extent.cold:
+        yield from bench_cold.rows()
 
 
 def _draw(found: Found, out: Path) -> None:
