@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 CITED = {
-    "source": "measured once on a like machine, not by this command (this project's issue)",
+    "source": "measured once for this project on one core of a like machine, not by this command",
     "figures": [
         {"code": "AUTO-07p", "ring": "circle, h/t 4, 0 to pi", "error": 4e-5, "ms": 26},
         {"code": "AUTO-07p", "ring": "circle, h/t 4, 0 to pi", "error": 7e-7, "ms": 47},
