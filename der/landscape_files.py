@@ -100,6 +100,14 @@ class Entries:
         """A whole number >= 0, or null."""
         return self.take(name, optional(checks.count))
 
+    def whole(self, name: str) -> int:
+        """A whole number of either sign."""
+        return self.take(name, _whole)
+
+    def whole_or_none(self, name: str) -> int | None:
+        """A whole number of either sign, or null."""
+        return self.take(name, optional(_whole))
+
     def text(self, name: str) -> str:
         """A string."""
         return self.take(name, checks.text)
@@ -129,6 +137,10 @@ class Entries:
         for name in self._left:
             place = f"{self._where}.{name}" if self._where else name
             raise ValueError(f"{place} is no entry of such a record")
+
+
+def _whole(name: str, given: Any) -> int:
+    return int(checks.checked_number(name, given, "a whole number", float.is_integer))
 
 
 def _built(build: Callable[[Entries], T]) -> Callable[[str, Any], T]:

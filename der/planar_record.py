@@ -199,7 +199,7 @@ class Squeeze(OnDisk):
 def _state(entries: Entries) -> PlanarState:
     return PlanarState(
         entries.text("name"),
-        int(entries.take("turning", _whole)),
+        entries.whole("turning"),
         entries.number("energy"),
         entries.number_or_none("energy_error"),
         entries.count_or_none("index"),
@@ -228,8 +228,3 @@ def _point(entries: Entries) -> SqueezePoint:
 def _finite(entries: Entries, name: str) -> Array:
     """A column without gaps."""
     return entries.take(name, lambda at, v: checks.numbers(at, v))
-
-
-def _whole(name: str, value: object) -> float:
-    """A whole number of either sign."""
-    return checks.checked_number(name, value, "a whole number", float.is_integer)

@@ -160,8 +160,8 @@ def _state(entries: Entries) -> RingState:
         entries.count_or_none("index"),
         entries.number("residual"),
         entries.truth("planar"),
-        entries.take("covering", checks.optional(_whole)),
-        entries.take("link", checks.optional(_whole)),
+        entries.whole_or_none("covering"),
+        entries.whole_or_none("link"),
         entries.number_or_none("writhe"),
         entries.number("twist"),
         entries.truth("needs_cut"),
@@ -178,12 +178,7 @@ def _transition(entries: Entries) -> Transition:
         entries.text("start"),
         entries.take("end", checks.optional(checks.text)),
         entries.number("stiffness"),
-        entries.take("sign", _whole),
+        entries.whole("sign"),
         tuple(entries.take("via", lambda name, value: checks.each(name, value, checks.text))),
         entries.number_or_none("released"),
     )
-
-
-def _whole(name: str, value: object) -> int:
-    """A whole number of either sign."""
-    return int(checks.checked_number(name, value, "a whole number", float.is_integer))
