@@ -216,7 +216,7 @@ def figure(
         turned = HYSTERESIS in chosen
         chosen = [name for name in chosen if name != HYSTERESIS]
         try:
-            drawn = draw(chosen, out, workers=workers)
+            drawn = draw(chosen, out, workers=workers, warn=lambda words: say(f"der: {words}"))
         except Interrupted as stopped:
             drawn, code = stopped.drawn, 130
         else:
@@ -566,10 +566,13 @@ def bench(
 @app.command()
 def stress(
     quick: Annotated[bool, typer.Option("--quick", help="120 cases, under a minute.")] = False,
-    long: Annotated[bool, typer.Option("--long", help="10,000 cases, about half an hour.")] = False,
+    long: Annotated[
+        bool, typer.Option("--long", help="10,000 cases, 20 minutes on 2 cores.")
+    ] = False,
     workers: Annotated[
         int | None, typer.Option(parser=whole, help="Processes; with --long one a core, else one.")
     ] = None,
+    seed: Annotated[int, typer.Option(parser=whole, help="Of the cases.")] = 0,
     json: Annotated[str | None, typer.Option(metavar="F", help="Write the summary here.")] = None,
 ) -> None:
     """Try to break both solvers, and count what has no named reason."""
@@ -584,6 +587,7 @@ def stress(
         summary = run(
             "long" if long else "quick",
             None if json is None else File(json),
+            seed=seed,
             workers=workers if workers is not None or long else 1,
         )
     show(str(summary))

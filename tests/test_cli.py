@@ -218,6 +218,7 @@ WRONG = [
     (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
     (("phase", "ellipse", "--out", "d", "--range", "x=1:2"), "--range", "'x'", "h_over_t"),
     (("stress", "--quick", "--long"), "--quick", "both", "together"),
+    (("stress", "--seed", "-1"), "--seed", "-1", "a whole number >= 0"),
     (("figure", "fig99", "--out", "."), "--name", "'fig99'", "fig2b"),
     (line("--egdes", "16"), "--egdes", "No such option", "--edges"),
     (("fold", "circle", "--h-over-t"), "--h-over-t", "requires", "argument"),

@@ -150,6 +150,9 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
         monkeypatch.setattr("validation.phase.follow", lambda *_, c=curves: Boundaries(c, []))
         options = {"ranges": ["b_over_a=0.9:1", "h-over-t=1.25:2.25"], "finest": 4, "quiet": True}
         run_phase("fig3a", folder, workers=1, resume=True, warn=told.append, **options)
+    monkeypatch.setattr("validation.phase.phase", lambda *_, **__: replace(diagram, curves=half))
+    draw(["fig3a"], folder, warn=told.append)
+    assert told[-2:] == told[-4:-2]
     assert re.fullmatch(r"fig3a: edges of the scan without a boundary .*: \d+", told[0])
     assert re.fullmatch(
         r"fig3a: ends of boundaries that lead nowhere: \d+, the first with b_over_a = .*", told[-1]

@@ -27,8 +27,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 import der
+from der import checks, relaxation
 from der import equilibrium as newton
-from der import relaxation
 from der.files import FilePath
 from der.ring import circle
 from der.scene import Scene
@@ -105,7 +105,7 @@ def stress(
     Raises
     ------
     ValueError
-        If there is no such level, or for a number of workers below 1.
+        If there is no such level, for a seed below 0, or for a number of workers below 1.
     OSError
         If the file cannot be written.
     RuntimeError
@@ -113,6 +113,7 @@ def stress(
     """
     if level not in LEVELS:
         raise ValueError(f"level must be one of {', '.join(LEVELS)}, got {level!r}")
+    checks.count("seed", seed)
     number, most_edges = LEVELS[level]
     number = number if count is None else count
     summary = Summary(level, seed)

@@ -21,7 +21,13 @@ __all__ = ["DIAGRAMS", "FIGURES", "Drawn", "Interrupted", "draw"]
 Draw: TypeAlias = Callable[[FilePath], list[File]]
 
 
-def draw(names: list[str] | tuple[str, ...], folder: FilePath, workers: int | None = None) -> Drawn:
+def draw(
+    names: list[str] | tuple[str, ...],
+    folder: FilePath,
+    workers: int | None = None,
+    *,
+    warn: Callable[[str], object] = lambda words: None,
+) -> Drawn:
     """Draw figures side by side, one thread each, and say what was written.
 
     New Python processes are started, so a script calls this under ``if __name__ == "__main__"``.
@@ -31,6 +37,7 @@ def draw(names: list[str] | tuple[str, ...], folder: FilePath, workers: int | No
     names : of FIGURES, and of DIAGRAMS, which take a minute each, those of cubes ten
     folder : where the files go; made if it is not there
     workers : how many figures at a time; None: as many as there are cores
+    warn : told, in a line each, what the boundaries of a diagram leave open
 
     Returns
     -------
@@ -51,16 +58,23 @@ def draw(names: list[str] | tuple[str, ...], folder: FilePath, workers: int | No
             raise ValueError(f"name must be one of {words}, got {name!r}")
     drawn = _draw({name: FIGURES[name] for name in names if name in FIGURES}, folder, workers)
     diagrams = {
-        name: _diagram(name, File(folder) / name, workers) for name in names if name in DIAGRAMS
+        name: _diagram(name, File(folder) / name, workers, warn)
+        for name in names
+        if name in DIAGRAMS
     }
     return Drawn({**drawn.written, **diagrams}, drawn.failed)
 
 
-def _diagram(name: str, folder: File, workers: int | None) -> list[File]:
+def _diagram(
+    name: str, folder: File, workers: int | None, warn: Callable[[str], object]
+) -> list[File]:
     """A phase diagram, in a folder of its own; it goes on with the cases that are there."""
-    from validation.phase import phase
+    from validation.phase import doubts, phase
 
-    return list(phase(name, folder, workers=workers, resume=True).files)
+    diagram = phase(name, folder, workers=workers, resume=True)
+    for words in doubts(diagram):
+        warn(f"{name}: {words}")
+    return list(diagram.files)
 
 
 def _curves(name: str, folder: FilePath) -> list[File]:
