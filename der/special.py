@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -35,7 +36,13 @@ _AGAINST = 1e-2  # of what its rates let expect: a value that changes so much th
 _NEARLY = 0.25  # of the softer end: a parabola that comes so close to zero is looked at
 
 
+_ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
+_HALVED = 0.25  # of what it was wrong by: on a part of the interval
+
+
 Indices = tuple[int | None, ...]  # by symmetry class, multiplicities not yet applied
+Point: TypeAlias = tuple[float, Equilibrium]  # a place, and the state there
+Value: TypeAlias = Callable[[Equilibrium], tuple[float, float]]  # and its rate along the path
 
 
 @dataclass(frozen=True)
@@ -120,31 +127,40 @@ def special_points(
 
 def _folds(step: Step) -> list[tuple[float, Equilibrium]]:
     """Folds of the load within a step, also a pair of them between tangents of equal sign."""
-    rates = (step.start.tangent.load, step.end_rate.load)
-    cuts = [0.0, *_slowest(step.length, step.jump.load, *rates), step.length]
-    places = [(s, step.at(s)) for s in cuts]
+
+    def along(at: Equilibrium) -> tuple[float, float]:
+        load, rate = _load(at)
+        return load, step.end_rate.load if at is step.end else rate
+
+    places = _looked_at(step, (0.0, step.start), (step.length, step.end), along)
     return [
-        _turn(step, low, high, lambda at: at.state.load, lambda at: at.tangent.load)
-        for low, high in pairwise(_cut(step, places, lambda at: (at.state.load, at.tangent.load)))
+        _turn(step, low, high, _load)
+        for low, high in pairwise(_cut(step, places, _load))
         if low[1].tangent.load * high[1].tangent.load < 0.0
     ]
 
 
-def _turn(
-    step: Step,
-    low: tuple[float, Equilibrium],
-    high: tuple[float, Equilibrium],
-    value: Callable[[Equilibrium], float],
-    rate: Callable[[Equilibrium], float],
-) -> tuple[float, Equilibrium]:
-    """The place between two, and its state, where a ``value`` turns: its ``rate`` changes sign."""
+def _load(at: Equilibrium) -> tuple[float, float]:
+    """The load, and its rate along the path."""
+    return at.state.load, at.tangent.load
+
+
+def _moment(at: Equilibrium) -> tuple[float, float]:
+    """The moment, and its rate along the path."""
+    return at.moment, at.moment_rate
+
+
+def _turn(step: Step, low: Point, high: Point, value: Value) -> Point:
+    """The place between two, and its state, where a ``value`` turns: its rate changes sign."""
     (s, a), (t, b) = low, high
-    c1, c2, c3 = _cubic(t - s, value(b) - value(a), rate(a), rate(b))
+    (first, rate), (last, other) = value(a), value(b)
+    c1, c2, c3 = _cubic(t - s, last - first, rate, other)
     # the root of c1 + 2 c2 u + 3 c3 u^2 between 0 and 1, where that changes its sign
     u = -c1 / (c2 + math.copysign(math.sqrt(max(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
     if not 0.0 < u < 1.0 and c3 != 0.0 and u != 0.0:
         u = c1 / (3.0 * c3 * u)
-    return step.change(rate, low, high, s + u * (t - s) if 0.0 < u < 1.0 else None)
+    guess = s + u * (t - s) if 0.0 < u < 1.0 else None
+    return step.change(lambda at: value(at)[1], low, high, guess)
 
 
 def _cubic(length: float, jump: float, first: float, last: float) -> tuple[float, float, float]:
@@ -153,26 +169,47 @@ def _cubic(length: float, jump: float, first: float, last: float) -> tuple[float
     return first, 3.0 * mean - 2.0 * first - last, first + last - 2.0 * mean
 
 
-def _slowest(length: float, jump: float, first: float, last: float) -> list[float]:
-    """Where a cubic's rate is smallest between two equal signs, if it may change sign there.
+def _looked_at(
+    step: Step, low: Point, high: Point, value: Value, off: float | None = None
+) -> list[Point]:
+    """Two places, and those between that tell whether the rate of a value changes sign there.
 
-    Two turns that lie close together show at the ends of an interval only by this.
+    Two turns that lie close together show at the ends of an interval only by the cubic between
+    them, whose rate is smallest in the middle. Where that says that they may be there, this place
+    is looked at, and the two halves again.
+
+    Parameters
+    ----------
+    off : by how much the rate of the cubic may be wrong; None: not known.
     """
-    if first * last <= 0.0 or length <= 0.0:  # two marks in one place
-        return []
-    _, c2, c3 = _cubic(length, jump, first, last)
+    (s, a), (t, b) = low, high
+    (first, rate), (last, other) = value(a), value(b)
+    if rate * other <= 0.0 or t - s < SAME * step.length:
+        return [low, high]
+    _, c2, c3 = _cubic(t - s, last - first, rate, other)
     u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
     if not 0.0 < u < 1.0:
-        return []
-    rate = first + (2.0 * c2 + 3.0 * c3 * u) * u
-    return [u * length] if rate * first < 0.1 * first * first else []
+        return [low, high]
+    expected = rate + (2.0 * c2 + 3.0 * c3 * u) * u
+    off = _ASLANT * abs(rate) if off is None else off
+    if math.copysign(1.0, rate) * expected >= off:
+        return [low, high]
+    place = s + u * (t - s)
+    middle = (place, step.at(place))
+    found = value(middle[1])[1]
+    if found * rate < 0.0:
+        return [low, middle, high]
+    # of third order in the length
+    off = _HALVED * abs(found - expected)
+    before = _looked_at(step, low, middle, value, off)
+    return [*before, *_looked_at(step, middle, high, value, off)[1:]]
 
 
 def _cut(
     step: Step,
-    places: list[tuple[float, Equilibrium]],
-    value: Callable[[Equilibrium], tuple[float, float]],
-) -> list[tuple[float, Equilibrium]]:
+    places: list[Point],
+    value: Value,
+) -> list[Point]:
     """Places with one more wherever a value changes against its rates at two of them.
 
     In between the rate has the other sign, on however short a way: by bisection. Where a ring is
@@ -248,15 +285,10 @@ def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
     """Limits of the moment between the marks of a line."""
     found = []
     for a, b in pairwise(line):
-        first, last = a.visit.at, b.visit.at
-        inside = _slowest(
-            b.s - a.s, last.moment - first.moment, first.moment_rate, last.moment_rate
-        )
-        middle = [(a.s + u, step.at(a.s + u)) for u in inside]
-        places = [(a.s, first), *middle, (b.s, last)]
-        for low, high in pairwise(_cut(step, places, lambda at: (at.moment, at.moment_rate))):
+        places = _looked_at(step, (a.s, a.visit.at), (b.s, b.visit.at), _moment)
+        for low, high in pairwise(_cut(step, places, _moment)):
             if low[1].moment_rate * high[1].moment_rate < 0.0:
-                s, at = _turn(step, low, high, lambda at: at.moment, lambda at: at.moment_rate)
+                s, at = _turn(step, low, high, _moment)
                 found.append(_Mark(s, Visit(at, "limit")))
     return found
 

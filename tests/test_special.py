@@ -43,6 +43,22 @@ def step_over_both():
 # --- two changes within one step --------------------------------------------------------------
 
 
+@pytest.mark.parametrize("h_over_t", [3.446, 3.5, 3.505])
+def test_two_limits_within_one_step_are_found_at_any_length_of_steps(monkeypatch, h_over_t):
+    """Between two limits 0.05 and 0.009 rad apart M is all but level; at h/t = 3.505 they are gone.
+
+    Truth: steps a seventh as long.
+    """
+    section = der.rectangular_section(h_over_t, nu=0.5)
+    wants = {"curvature": "angle", "contacts": False, "save_at": (1.64, 1.69)}
+    scene = der.Scene(der.circle(), section, n_edges=32, **wants)
+    found = der.fold(scene).points
+    monkeypatch.setattr("der.path.LARGEST_STEP", 0.05)
+    other = der.fold(scene).points
+    assert len(found) == len(other)
+    assert [p.gamma for p in found] == pytest.approx([p.gamma for p in other], abs=1e-8)
+
+
 def test_two_changes_of_an_index_within_one_step_are_found():
     """A class that is unstable on half of a step only, with equal indices at the step's two ends.
 
