@@ -34,11 +34,8 @@ _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 _SOFT = 0.1
 _AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way
 _NEARLY = 0.25  # of the softer end: a parabola that comes so close to zero is looked at
-
-
 _ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
 _HALVED = 0.25  # of what it was wrong by: on a part of the interval
-
 
 Indices = tuple[int | None, ...]  # by symmetry class, multiplicities not yet applied
 Point: TypeAlias = tuple[float, Equilibrium]  # a place, and the state there
