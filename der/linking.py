@@ -94,13 +94,15 @@ def _solid_angles(x, i, first, last):
         r1 = (p * u + px * ux + py * uy + pz * uz) * v + uv * p + pv * u
         r2 = (p * v + pv) * q + (vx * qx + vy * qy + vz * qz) * p + pq * v
         a, b = r1 * r2 - triple * triple, triple * (r1 + r2)
-        if count == 4 or not a > 2.0 * abs(b):
+        far = a > 2.0 * abs(b)
+        least = _THIN * (p * v) * (p * v) * u * q
+        if count == 4 or not far:
             total += np.arctan2(imaginary, real)
             real, imaginary, count = 1.0, 0.0, 0
-        if a > 2.0 * abs(b):
+        if far and a > least:
             real, imaginary = real * a - imaginary * b, real * b + imaginary * a
             count += 1
-        elif abs(a) + abs(b) > _THIN * p * p * u * v * v * q:
+        elif abs(a) + abs(b) > least:
             total += np.arctan2(b, a)
         else:
             total += 0.5 * _quadrilateral(x[start], x[i], x[k - 1], x[k])

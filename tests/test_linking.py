@@ -233,6 +233,25 @@ def test_link_of_strands_that_all_but_touch(lift):
     assert miss < 1e-14 / abs(lift)
 
 
+@SEEDS
+def test_writhe_where_a_vertex_all_but_touches_an_edge(seed):
+    """Against the quadrilaterals of all pairs, each by its arcsines: roundings, over the distance.
+
+    A complex number may lose its digits there although its argument is small.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(10):
+        x = random_ribbon(rng.integers(100)).x
+        n = len(x)
+        i = rng.integers(n)
+        j = (i + rng.integers(5, n - 5)) % n
+        lift = 1e-7 * classical.unit(rng.normal(size=3))
+        x[i] = x[j] + rng.uniform(0.2, 0.8) * (x[j - 1] - x[j]) + lift
+        pairs = [(a, b) for a in range(n) for b in range(a + 2, n) if (b + 1) % n != a]
+        areas = [_quadrilateral(x[a - 1], x[a], x[b - 1], x[b]) for a, b in pairs]
+        assert writhe(x, 1) == pytest.approx(-sum(areas) / (2.0 * np.pi), abs=2e-10)
+
+
 @pytest.mark.parametrize("lift", [0.3, 0.01, -0.01, -0.3])
 def test_figure_eight(lift):
     """One crossing, right-handed where the strand along (1, 1) passes above the one along (-1, 1).
