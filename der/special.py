@@ -438,7 +438,23 @@ def _passages(
         line[0] = replace(line[0], visit=replace(line[0].visit, link=piece.link(step.start.state)))
     end = replace(last, visit=replace(last.visit, link=piece.link(last.visit.at.state)))
     found = _contacts(piece, wanted, step, (line[0].s, line[0].visit.link), (end.s, end.visit.link))
-    return sorted([*line[:-1], end, *_lasting(found)], key=lambda m: m.s)
+    line = [*line[:-1], end]
+    contacts = [_on_its_side(step, line, m) for m in _lasting(found)]
+    return sorted([*line, *contacts], key=lambda m: m.s)
+
+
+def _on_its_side(step: Step, line: list[_Mark], contact: _Mark) -> _Mark:
+    """A contact, put on the other side of a state solved for where its load says so.
+
+    The place of a state at a given load is known to second order only.
+    """
+    load, rate = _load(contact.visit.at)
+    for m in line[1:-1]:  # the ends of the step stay its ends
+        if not m.visit.kind and abs(m.s - contact.s) < SAME * step.length:
+            ahead = (load - m.visit.at.state.load) * rate
+            if ahead * (contact.s - m.s) < 0.0:
+                contact = replace(contact, s=math.nextafter(m.s, math.copysign(math.inf, ahead)))
+    return contact
 
 
 def _lasting(contacts: list[_Mark]) -> list[_Mark]:

@@ -8,11 +8,20 @@ import pytest
 from rods import lifted
 
 import der
-from der.branches import is_fold
+from der.branches import SAME, is_fold
 from der.equilibrium import dot
 from der.path import follow
 from der.sector import sector
-from der.special import Wanted, _closest, _cut, special_points, visit
+from der.special import (
+    Visit,
+    Wanted,
+    _closest,
+    _cut,
+    _Mark,
+    _on_its_side,
+    special_points,
+    visit,
+)
 from der.stability import index, indices_and_stiffness, raw_index, softest_modes, stack
 from der.step import Step, Tally
 
@@ -38,6 +47,22 @@ def step_over_both():
     a, b = (next(v for v in side if not v.kind) for side in (found[fold::-1], found[fold:]))
     trial = Step(piece, a.at, b.at, 1.0, 1e-10, Tally())
     return Step(piece, a.at, b.at, dot(piece.body, a.at.tangent, trial.jump), 1e-10, Tally())
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_contact_stands_on_the_side_of_a_state_that_its_load_says(side):
+    """Where the place of that state is a little off, and only there."""
+    step = step_over_both()
+    s = 0.1 * step.length
+    asked = _Mark(s, Visit(step.at(s)))
+    line = [_Mark(0.0, Visit(step.start)), asked, _Mark(step.length, Visit(step.end))]
+    near, far = 0.5 * SAME * step.length, 1e-2 * step.length
+    for off, said, expected in ((near, -side, side), (near, side, side), (far, -side, -side)):
+        contact = _Mark(s + said * off, Visit(step.at(s + side * near), "contact"))
+        placed = _on_its_side(step, line, contact)
+        assert (placed.s - s) * expected > 0.0
+        assert abs(placed.s - contact.s) <= 1.01 * near
+        assert placed.visit is contact.visit
 
 
 # --- two changes within one step --------------------------------------------------------------

@@ -101,9 +101,10 @@ def _monotonic(path: Path, tolerance: float) -> Iterator[Fault]:
     """Gamma turns at folds and nowhere else; M at limits, and with gamma's sense at folds."""
     contacts = {point.position for point in path.contacts}
     cuts = _cuts(path, path.folds)
+    same = max(SAME, tolerance)  # residuals leave gamma as uncertain as they are large
     for low, high in pairwise(cuts):
         rise = np.diff(path.gamma[low : high + 1])
-        if not rise.size or min(rise.max(), -rise.min()) <= SAME:
+        if not rise.size or min(rise.max(), -rise.min()) <= same:
             continue
         back = low + np.flatnonzero(rise * np.sign(rise.sum()) < 0.0)
         if all({k, k + 1} & contacts for k in back.tolist()):
