@@ -50,6 +50,8 @@ def checked_number(
     ValueError
         If `value` is not a number (a bool and a string are none), not finite, or not allowed.
     """
+    if type(value) is float and math.isfinite(value) and is_allowed(value):
+        return value  # as nearly all are
     number = math.nan
     if isinstance(value, Real) and not isinstance(value, bool):
         with suppress(OverflowError):  # an int too large for a float stays nan
@@ -201,5 +203,7 @@ def _json_value(name: str, value: object) -> object:
     if isinstance(value, Mapping):
         return json_object(name, value)
     if isinstance(value, list | tuple):
+        if all(type(entry) is float and math.isfinite(entry) for entry in value):
+            return list(value)  # as long ones are
         return each(name, value, _json_value)
     raise ValueError(f"{name} must be something JSON can hold, got a {type(value).__name__}")

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from der.equilibrium import equilibrium
 from der.frames import Array
 from der.passages import gap, nearest_strands
 from der.path import follow
-from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode
+from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode, release
 from der.ring import circle
 from der.rod import State
 from der.scene import Scene, meshes
@@ -369,15 +368,6 @@ def _shapes(scene: Scene, piece: Sector, visits: list[Visit], status: str) -> Sh
     return shapes(piece, visits, arc_length, history=scene.history, modes=modes)
 
 
-@cache
-def _release() -> str:
-    """The package's version: looking it up reads a file."""
-    try:
-        return version("ring-origami")
-    except PackageNotFoundError:  # run from a source tree that was never installed
-        return "unknown"
-
-
 def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
     return {
         "n_edges": scene.n_edges,
@@ -394,5 +384,5 @@ def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
         "error_bars": scene.error_bars,
         "save_at": None if scene.save_at is None else list(scene.save_at),
         "stability": scene.stability,
-        "version": _release(),
+        "version": release(),
     }

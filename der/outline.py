@@ -116,7 +116,7 @@ class PiecewiseLinear:
         last = len(self.curvature_start) - 1
         i = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, last)
         rise = self.curvature_end[i] - self.curvature_start[i]
-        return i, s - self.knots[i], rise / np.diff(self.knots)[i]
+        return i, s - self.knots[i], rise / (self.knots[i + 1] - self.knots[i])
 
 
 def _chord(u: Array, angle: Array, curvature: Array, slope: Array) -> ComplexArray:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Self
 
 import numpy as np
@@ -276,6 +278,15 @@ def folding_mode(
         snapping=snapping,
         stable_3d=None if at_pi.index_moment is None else at_pi.index_moment == 0,
     )
+
+
+@cache
+def release() -> str:
+    """The package's version: looking it up reads a file."""
+    try:
+        return version("ring-origami")
+    except PackageNotFoundError:  # run from a source tree that was never installed
+        return "unknown"
 
 
 def counts(values: Iterable[int | None]) -> Counts:

@@ -10,7 +10,7 @@ from bvp import system, visits
 import der
 from validation import continuation
 from validation.collocation import Collocation, Error, collocation
-from validation.continuation import Stuck, Tally, Visit, Wanted, follow, root
+from validation.continuation import Stuck, Tally, Visit, Wanted, follow
 from validation.sectors import sector
 
 EIGHTH = math.pi / 8
@@ -19,11 +19,6 @@ EIGHTH = math.pi / 8
 def followed(ring: der.Ring, h_over_t: float, **wants) -> list[Visit]:
     """All that is met on a path."""
     return list(follow(system(ring, h_over_t), Wanted(**wants), Tally()))
-
-
-def test_root_is_found_between_unequal_signs():
-    """Brent's method on a cubic whose root is known, to 1e-10 of the interval."""
-    assert root(lambda s: (s - 0.3) * (s * s + 1.0), 0.0, 1.0) == pytest.approx(0.3, abs=1e-9)
 
 
 def test_path_starts_with_the_flat_ring():

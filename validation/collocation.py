@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from validation.corrector import CONVERGED, DIVERGED, SINGULAR, SLOW, correct, observe
+from validation.corrector import CONVERGED, DIVERGED, SINGULAR, SLOW, correct
 from validation.gauss import Array, Rule, rule
 from validation.meshes import Mesh, first_mesh, moved_to
 from validation.sectors import Sector
@@ -90,9 +90,11 @@ class Collocation:
         """The solution beside ``guess``: at its gamma, or in the plane across ``along``."""
         piece = self.sector.piece
         frames, p = guess.frames.copy(), guess.p.copy()
-        status, done, _, gamma, nodes, places, *tangent, rate, orientation = correct(
-            self.rule,
-            piece,
+        n, m = mesh.rest.shape
+        nodes, places = np.empty((n + 1, 4)), np.empty((n + 1, 3))
+        tangent, tangent_p = np.empty((n, m, 4)), np.empty(len(p))
+        status, done, gamma, tangent_gamma, rate, orientation, moment, energy = correct(
+            *piece,
             mesh.h,
             mesh.rest,
             frames,
@@ -103,10 +105,13 @@ class Collocation:
             by_gamma,
             iterations,
             tolerance,
+            nodes,
+            places,
+            tangent,
+            tangent_p,
         )
         if status != CONVERGED and not (status == SLOW and tolerance == 0.0):
             return Failure(status, done)
-        moment, energy = observe(self.rule, piece, mesh.h, mesh.rest, frames, p)
         return Solution(
             mesh,
             frames,
@@ -114,7 +119,7 @@ class Collocation:
             gamma,
             moment,
             self.sector.copies * energy,
-            Direction(*tangent),
+            Direction(tangent, tangent_p, tangent_gamma),
             rate,
             orientation,
             nodes,

@@ -225,7 +225,7 @@ def _exchanged(system: Collocation, mesh: Mesh, frames: Array, seed: Value) -> V
 def _state(system: Collocation, mesh: Mesh, found: Centre) -> Solution:
     """The centre of an exchange as a solution, which has no tangent."""
     at, p, gamma = found.shot, found.x[:-1], float(found.x[-1])
-    moment, energy = observe(system.rule, system.sector.piece, mesh.h, mesh.rest, at.frames, p)
+    moment, energy = observe(system.sector.piece, mesh.h, mesh.rest, at.frames, p)
     none = Direction(np.zeros_like(at.frames), np.zeros_like(p), 0.0)
     energy *= system.sector.copies
     return Solution(mesh, at.frames, p, gamma, moment, energy, none, 0.0, 0, at.nodes, at.places, 0)

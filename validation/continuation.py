@@ -18,6 +18,7 @@ import numpy as np
 
 from validation.collocation import Collocation, Direction, Error, Failure, Solution
 from validation.meshes import Mesh, fitted
+from validation.roots import rate_of_cubic, root, slowest, turn_of
 
 FIRST_STEP = 0.05
 FIRST_TURN, LEAST_TURN = 0.02, 2e-4  # rad
@@ -29,11 +30,11 @@ STRAIGHT = 0.01  # bulge of a step that is believed although its ends are orient
 MOST_STEPS = 2000
 MOST_WORK = 200_000  # intervals of all steps together: a ring that winds up needs ever more of them
 FEWEST_INTERVALS, MOST_INTERVALS = 3, 4000
-REFIT = 4  # steps after which the mesh is fitted again
+REFIT = 16  # steps after which the mesh is fitted again, unless its error asks for it before
 IN_VAIN = 4.0  # times the intervals, which at order 8 leave 2e-5 of an error: where they leave
 REMAINS = 0.5  # half of it or more, what is left is rounding
 SAFETY = 0.25  # of the tolerance: the error aimed at
-ROOT = 1e-10  # of s: gamma at a fold, M at a limit are quadratic in it
+NEGLIGIBLE = 1e-3  # of the tolerance: square of a step's last increment, about the error left
 EIGHTH = math.pi / 8.0
 
 
@@ -106,26 +107,44 @@ class Step:
     length: float
     tally: Tally
     jump: Direction = field(init=False)
-    rate: float = field(init=False)  # of the tangent at the end, for s measured at the start
+    facing: float = field(init=False)  # cosine of the angle between the tangents at both ends
+    found: dict[float, Solution] = field(init=False)  # by s
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
         jump = Direction(b.frames - a.frames, b.p - a.p, b.gamma - a.gamma)
         object.__setattr__(self, "jump", jump)
-        object.__setattr__(self, "rate", 1.0 / dot(a.mesh, a.tangent, b.tangent))
+        object.__setattr__(self, "facing", dot(a.mesh, a.tangent, b.tangent))
+        object.__setattr__(self, "found", {0.0: a, self.length: b})
 
-    def guess(self, s: float) -> Direction:
-        """The cubic's value."""
+    def _weights(self, s: float) -> tuple[float, float, float]:
+        """Of the tangent at the start, the jump and the tangent at the end, in the cubic."""
         u = s / self.length
         h10 = self.length * u * (1.0 - u) ** 2
         h01 = u * u * (3.0 - 2.0 * u)
-        h11 = self.length * u * u * (u - 1.0) * self.rate
+        h11 = self.length * u * u * (u - 1.0) / self.facing  # s is measured at the start
+        return h10, h01, h11
+
+    def gamma(self, s: float) -> float:
+        """The cubic's gamma."""
+        h10, h01, h11 = self._weights(s)
+        bent = h10 * self.start.tangent.gamma + h11 * self.end.tangent.gamma
+        return self.start.gamma + h01 * self.jump.gamma + bent
+
+    def guess(self, s: float) -> Direction:
+        """The cubic's value."""
+        h10, h01, h11 = self._weights(s)
         a, j, b = self.start.tangent, self.jump, self.end.tangent
         return Direction(
             self.start.frames + h10 * a.frames + h01 * j.frames + h11 * b.frames,
             self.start.p + h10 * a.p + h01 * j.p + h11 * b.p,
             self.start.gamma + h10 * a.gamma + h01 * j.gamma + h11 * b.gamma,
         )
+
+    @property
+    def angle(self) -> float:
+        """Angle between the tangents at both ends [rad]."""
+        return math.acos(min(1.0, max(-1.0, self.facing)))
 
     @property
     def bulge(self) -> float:
@@ -135,39 +154,33 @@ class Step:
 
     def at(self, s: float) -> Solution:
         """The solution at ``s``."""
-        if s == 0.0:
-            return self.start
-        if s == self.length:
-            return self.end
-        return self._solved(self.guess(s), by_gamma=False)
+        if s not in self.found:
+            self.found[s] = self._solved(self.guess(s), by_gamma=False)
+        return self.found[s]
+
+    def cosine(self, at: Solution) -> float:
+        """Of the angle between the tangents at the start and at a solution."""
+        if at is self.start:
+            return 1.0
+        return self.facing if at is self.end else dot(at.mesh, self.start.tangent, at.tangent)
 
     def at_gamma(self, gamma: float, low: float, high: float) -> tuple[float, Solution]:
         """The solution at ``gamma`` between s = low and high, where gamma is monotonic."""
-
-        def cubic(s: float) -> float:
-            return self.guess(s).gamma - gamma
-
-        if cubic(low) * cubic(high) < 0.0:
-            s = root(cubic, low, high)
+        if (self.gamma(low) - gamma) * (self.gamma(high) - gamma) < 0.0:
+            guess = self.guess(root(lambda s: self.gamma(s) - gamma, low, high))
             try:
-                found = self._solved(self.guess(s)._replace(gamma=gamma), by_gamma=True)
+                found = self._solved(guess._replace(gamma=gamma), by_gamma=True)
             except Stuck:
                 found = None
-            if found is not None and self._near(found, s):
-                return self._place(found), found
+            if found is not None and self._near(found, guess):
+                s = along(self.start, found)
+                return s, self.found.setdefault(s, found)
         # close to a fold: gamma is a bad coordinate there, s is not
         s = root(lambda t: self.at(t).gamma - gamma, low, high)
         return s, self.at(s)._replace(gamma=gamma)
 
-    def _place(self, found: Solution) -> float:
-        """The s of a solution: its distance along the tangent at the start."""
-        a = self.start
-        away = Direction(found.frames - a.frames, found.p - a.p, found.gamma - a.gamma)
-        return dot(a.mesh, a.tangent, away)
-
-    def _near(self, found: Solution, s: float) -> bool:
+    def _near(self, found: Solution, there: Direction) -> bool:
         """Whether a solution found at given gamma lies where the cubic expects it."""
-        there = self.guess(s)
         away = Direction(found.frames - there.frames, found.p - there.p, 0.0)
         return dot(self.start.mesh, away, away) < (0.1 * self.length) ** 2
 
@@ -181,14 +194,13 @@ class Step:
 
 def dot(mesh: Mesh, a: Direction, b: Direction) -> float:
     """Mean over the rod of the product of rotations, plus that of gammas."""
-    return float(np.einsum("ij,ijk,ijk", mesh.weights, a.frames, b.frames)) + a.gamma * b.gamma
+    return float(np.vdot(mesh.weights * a.frames, b.frames)) + a.gamma * b.gamma
 
 
-def root(f: Callable[[float], float], low: float, high: float) -> float:
-    """Root of ``f`` between two places where its signs differ (Brent)."""
-    from scipy.optimize import brentq
-
-    return float(brentq(f, low, high, xtol=ROOT * max(high, 1e-3), rtol=8.9e-16))
+def along(start: Solution, there: Solution | Direction) -> float:
+    """Distance of a state on the same mesh along the tangent at the start."""
+    away = Direction(there.frames - start.frames, there.p - start.p, there.gamma - start.gamma)
+    return dot(start.mesh, start.tangent, away)
 
 
 def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
@@ -203,14 +215,14 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
     tally.newton_iterations += here.iterations
     scales = Scales(here, LEAST_TURN)  # a stiff ring's moment is largest long before FIRST_TURN
     yield Visit(here, error)
-    bend: Direction | None = None  # rate of change of the tangent over the last step
+    last: Step | None = None  # on the present mesh
     length, age = FIRST_STEP, 0
     first: tuple[int, float] | None = None  # intervals and error that did not do for this step
     while True:
         if tally.steps >= MOST_STEPS or tally.work >= MOST_WORK:
             raise Stuck(f"the path has not ended after {tally.steps} steps")
         tally.work += len(here.mesh.h)
-        step = _advance(system, tally, here, bend, length)
+        step = _advance(system, tally, here, last, length, wanted.tolerance)
         error = system.error(step.end)
         size = scales.largest([Visit(step.end, error)])
         if size <= wanted.tolerance:
@@ -232,28 +244,21 @@ def follow(system: Collocation, wanted: Wanted, tally: Tally) -> Iterator[Visit]
             # at least one more than asked for last: a mesh rounds to what its joints allow
             n = min(max(n + 1, _refined(n_here, size, wanted.tolerance)), _most(system))
             here = _refitted(system, tally, here, step.end, n)
-            bend, length, age = None, step.length, 0
+            last, length, age = None, step.length, 0
             continue
         tally.steps += 1
         scales.take(found)
         yield from found
         if ended:
             return
-        angle = _between(step.start, step.end)
-        ease = math.sqrt(ANGLE / max(angle, 1e-3))
+        ease = math.sqrt(ANGLE / max(step.angle, 1e-3))
         if step.end.iterations > 4:
             ease = min(ease, 0.7)
         length = min(step.length * min(max(ease, 0.5), 2.0), LARGEST_STEP)
-        a, b = step.start.tangent, step.end.tangent
-        bend = Direction(
-            (b.frames - a.frames) / step.length,
-            (b.p - a.p) / step.length,
-            (b.gamma - a.gamma) / step.length,
-        )
-        here, age, first = step.end, age + 1, None
+        here, last, age, first = step.end, step, age + 1, None
         if age >= REFIT:
             n = _refined(len(here.mesh.h), size, wanted.tolerance)
-            here, bend, age = _refitted(system, tally, here, here, n), None, 0
+            here, last, age = _refitted(system, tally, here, here, n), None, 0
 
 
 def _flat(system: Collocation, wanted: Wanted) -> tuple[Solution, Error, int]:
@@ -312,44 +317,50 @@ def _refitted(system: Collocation, tally: Tally, here: Solution, fit: Solution, 
     return found
 
 
-def _between(a: Solution, b: Solution) -> float:
-    """Angle between the tangents at two solutions on one mesh [rad]."""
-    return math.acos(min(1.0, max(-1.0, dot(a.mesh, a.tangent, b.tangent))))
-
-
 def _advance(
-    system: Collocation, tally: Tally, start: Solution, bend: Direction | None, length: float
+    system: Collocation,
+    tally: Tally,
+    start: Solution,
+    last: Step | None,
+    length: float,
+    tolerance: float,
 ) -> Step:
-    """One accepted step of at most ``length``, shortened until Newton's method follows."""
-    t = start.tangent
+    """One accepted step of at most ``length``, shortened until Newton's method follows.
+
+    What Newton's method leaves is the square of the last increment, times 13 at most (measured);
+    the tangent is that before it.
+    """
+    close = math.sqrt(NEGLIGIBLE * tolerance)
     reason = ""
     while length > SMALLEST_STEP:
-        one, two = length, 0.5 * length * length
-        if bend is None:
-            guess = Direction(
-                start.frames + one * t.frames, start.p + one * t.p, start.gamma + one * t.gamma
-            )
-        else:
-            # s is the projection on the tangent, which the second-order term must not change
-            one -= two * dot(start.mesh, t, bend)
-            guess = Direction(
-                start.frames + one * t.frames + two * bend.frames,
-                start.p + one * t.p + two * bend.p,
-                start.gamma + one * t.gamma + two * bend.gamma,
-            )
-        end = system.solved(start.mesh, guess, t, iterations=7)
+        guess = _predicted(start, last, length)
+        end = system.solved(start.mesh, guess, start.tangent, iterations=7, tolerance=close)
         tally.newton_iterations += end.iterations
         if isinstance(end, Failure):
             reason = end.reason
-        elif _between(start, end) < SHARPEST:
-            step = Step(system, start, end, length, tally)
-            if start.orientation == end.orientation or step.bulge < STRAIGHT:
-                return step
-            reason = "the path changes its orientation"
         else:
-            reason = "the path turns too sharply"
+            step = Step(system, start, end, length, tally)
+            if not step.angle < SHARPEST:
+                reason = "the path turns too sharply"
+            elif start.orientation == end.orientation or step.bulge < STRAIGHT:
+                return step
+            else:
+                reason = "the path changes its orientation"
         length *= 0.5
     raise Stuck(f"no step forward from gamma = {start.gamma:.8f}: {reason}")
+
+
+def _predicted(start: Solution, last: Step | None, length: float) -> Direction:
+    """A guess at distance ``length`` along the tangent, from the curve of the step before."""
+    t = start.tangent
+    if last is None:
+        guess, left = Direction(start.frames, start.p, start.gamma), length
+    else:
+        guess = last.guess(last.length + length * last.facing)
+        left = length - along(start, guess)  # of the distance, which the curve does not know
+    return Direction(
+        guess.frames + left * t.frames, guess.p + left * t.p, guess.gamma + left * t.gamma
+    )
 
 
 # --- What is special on a step ---------------------------------------------------------------
@@ -384,64 +395,46 @@ def _special_points(
 
 def _folds(step: Step) -> list[Mark]:
     """Folds of gamma within a step, also a pair of them between tangents of equal sign."""
-    rates = (step.start.tangent.gamma, step.end.tangent.gamma * step.rate)
-    cuts = [0.0, *_slowest(step.length, step.jump.gamma, *rates), step.length]
-    return [
-        Mark(*_root_of(step, lambda at: at.tangent.gamma, s0, s1), "fold")
-        for s0, s1 in pairwise(cuts)
-        if step.at(s0).tangent.gamma * step.at(s1).tangent.gamma < 0.0
-    ]
+    ends = Mark(0.0, step.start, ""), Mark(step.length, step.end, "")
+    return [Mark(s, step.at(s), "fold") for s in _turns(step, _of_gamma, *ends)]
 
 
 def _limits(step: Step, line: list[Mark]) -> list[Mark]:
     """Limits of the moment between the marks of a line."""
-    found = []
-    for a, b in pairwise(line):
-        rates = (_rate(step, a.at), _rate(step, b.at))
-        inside = _slowest(b.s - a.s, b.at.moment - a.at.moment, *rates)
-        for s0, s1 in pairwise([a.s, *(a.s + u for u in inside), b.s]):
-            first = a.at if s0 == a.s else step.at(s0)
-            last = b.at if s1 == b.s else step.at(s1)
-            if first.moment_rate * last.moment_rate < 0.0:
-                found.append(Mark(*_root_of(step, lambda at: at.moment_rate, s0, s1), "limit"))
-    return found
+    places = [s for a, b in pairwise(line) for s in _turns(step, _of_moment, a, b)]
+    return [Mark(s, step.at(s), "limit") for s in places]
 
 
-def _rate(step: Step, at: Solution) -> float:
-    """dM/ds, s measured along the tangent at the start."""
-    return at.moment_rate / dot(at.mesh, step.start.tangent, at.tangent)
+def _of_gamma(at: Solution) -> tuple[float, float]:
+    """A solution's gamma, and its rate along the tangent."""
+    return at.gamma, at.tangent.gamma
 
 
-def _root_of(
-    step: Step, value: Callable[[Solution], float], s0: float, s1: float
-) -> tuple[float, Solution]:
-    """Place and solution where a function of the solutions vanishes.
+def _of_moment(at: Solution) -> tuple[float, float]:
+    """A solution's moment, and its rate along the tangent."""
+    return at.moment, at.moment_rate
 
-    A solution found at a given gamma differs from that at its s by rounding: where the function
-    vanishes within that of one end, the end it is.
+
+def _turns(
+    step: Step, value: Callable[[Solution], tuple[float, float]], a: Mark, b: Mark
+) -> Iterator[float]:
+    """Places between two marks where a value turns back.
+
+    Two of them that lie close together show at the marks only by the cubic through these.
     """
-    first, last = value(step.at(s0)), value(step.at(s1))
-    if first * last > 0.0:
-        s = s0 if abs(first) < abs(last) else s1
-    else:
-        s = root(lambda t: value(step.at(t)), s0, s1)
-    return s, step.at(s)
-
-
-def _slowest(length: float, jump: float, first: float, last: float) -> list[float]:
-    """Where a cubic's rate is smallest between two equal signs, if it may change sign there.
-
-    Two turns that lie close together show at the ends of an interval only by this.
-    """
-    if first * last <= 0.0 or length <= 0.0:
-        return []
-    c2 = 3.0 * jump / length - 2.0 * first - last
-    c3 = first + last - 2.0 * jump / length
-    u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
-    if not 0.0 < u < 1.0:
-        return []
-    rate = first + (2.0 * c2 + 3.0 * c3 * u) * u
-    return [u * length] if rate * first < 0.1 * first * first else []
+    (low, first), (high, last) = value(a.at), value(b.at)
+    length = b.s - a.s
+    rates = length * first / step.cosine(a.at), length * last / step.cosine(b.at)
+    cubic = rate_of_cubic(high - low, *rates)
+    if first * last < 0.0:
+        guess = a.s + length * turn_of(*cubic)
+        yield root(lambda s: value(step.at(s))[1], a.s, b.s, guess)
+    elif (u := slowest(*cubic)) is not None:
+        s = a.s + length * u
+        middle = Mark(s, step.at(s), "")
+        if first * value(middle.at)[1] < 0.0:
+            yield from _turns(step, value, a, middle)
+            yield from _turns(step, value, middle, b)
 
 
 def _at_targets(wanted: Wanted, step: Step, folds: list[Mark]) -> tuple[list[Mark], bool]:

@@ -22,10 +22,14 @@ import numpy as np
 from numba import njit
 
 from validation.equations import directors, product, stage
-from validation.gauss import Array
+from validation.gauss import Array, rule
 
 CONVERGED, DIVERGED, SLOW, SINGULAR = 0, 1, 2, 3
 LARGEST = 2.0  # a Newton increment of a frame above this leads nowhere
+
+# the rule's tables are constants to the kernels, see `gauss.Rule`
+WEIGHTS, PARTIAL, SLOPE = rule().weights, rule().partial, rule().slope
+SLOPE_SUM, LAST, FIRST = rule().slope_sum, rule().last, rule().first
 
 
 class Piece(NamedTuple):
@@ -39,52 +43,71 @@ class Piece(NamedTuple):
 
 
 class Inner(NamedTuple):
-    """Workspace: what an interval's equations are made of, at its m stages."""
+    """Workspace: what an interval's equations are made of, at its m stages.
+
+    The numbers q of all stages stand in one row of 4 m, along which the longest loops run.
+    """
 
     at: Array  # (m, 3) positions less the first
     d: Array  # (m, 3, 3) directors
     f: Array  # (m, 4) q'
     fq: Array  # (m, 4, 4) its derivatives by q,
-    fm: Array  # (m, 4, 3) by the moment
-    fx: Array  # (m, 4, 3) and by position
+    fm: Array  # (m, 4, 3) by the moment there,
+    fp: Array  # (6, 4 m) by m0 and F
+    fx: Array  # (3, 4 m) and by position
     gq: Array  # (m, 3, 4) derivative of d3 by q
+    bent: Array  # (3, 4 m) change of q' by the tangents of one stage
 
 
 @njit(cache=True)
-def _eliminate(w, n):
-    """Solve in place: (n, n + c) rows [matrix | right-hand sides]; returns the determinant's sign.
+def workspace(m):
+    """Workspace for intervals of m stages."""
+    return Inner(
+        np.empty((m, 3)),
+        np.empty((m, 3, 3)),
+        np.empty((m, 4)),
+        np.empty((m, 4, 4)),
+        np.empty((m, 4, 3)),
+        np.empty((6, 4 * m)),
+        np.empty((3, 4 * m)),
+        np.empty((m, 3, 4)),
+        np.empty((3, 4 * m)),
+    )
 
-    0 where a pivot vanishes. Solutions replace the right-hand sides.
+
+@njit(cache=True)
+def _eliminate(w):
+    """Solve in place: (n + c, n) columns of [matrix | right-hand sides]; the determinant's sign.
+
+    0 where a pivot vanishes. Solutions replace the right-hand sides, multipliers the matrix. Gauss
+    and Jordan's elimination takes more products than Gauss's, but all its loops run over n numbers
+    next to each other.
     """
+    n = w.shape[1]
     sign = 1
-    width = w.shape[1]
     for k in range(n):
         pivot, row = abs(w[k, k]), k
         for i in range(k + 1, n):
-            if abs(w[i, k]) > pivot:
-                pivot, row = abs(w[i, k]), i
+            size = abs(w[k, i])
+            row = i if size > pivot else row
+            pivot = size if size > pivot else pivot
         if not pivot > 0.0:
             return 0
+        if w[k, row] < 0.0:
+            sign = -sign
         if row != k:
             sign = -sign
-            for j in range(k, width):
-                w[k, j], w[row, j] = w[row, j], w[k, j]
-        if w[k, k] < 0.0:
-            sign = -sign
+            for j in range(k, w.shape[0]):
+                w[j, k], w[j, row] = w[j, row], w[j, k]
         inverse = 1.0 / w[k, k]
-        for i in range(k + 1, n):
-            factor = w[i, k] * inverse
-            if factor != 0.0:
-                for j in range(k + 1, width):
-                    w[i, j] -= factor * w[k, j]
-    for k in range(n - 1, -1, -1):
-        inverse = 1.0 / w[k, k]
-        for j in range(n, width):
-            w[k, j] *= inverse
-        for i in range(k):
-            factor = w[i, k]
-            for j in range(n, width):
-                w[i, j] -= factor * w[k, j]
+        for i in range(n):
+            w[k, i] *= inverse
+        w[k, k] = 0.0
+        for j in range(k + 1, w.shape[0]):
+            factor = w[j, k]
+            for i in range(n):
+                w[j, i] -= factor * w[k, i]
+            w[j, k] = factor * inverse
     return sign
 
 
@@ -128,7 +151,7 @@ def _constants(loads, p, out_m0, out_force):
 
 
 @njit(cache=True)
-def _stages(partial, h, place, frames, out_at, out_d):
+def _stages(h, place, frames, out_at, out_d):
     """Positions and directors at the stages of an interval that starts at ``place``."""
     m = frames.shape[0]
     for j in range(m):
@@ -137,7 +160,7 @@ def _stages(partial, h, place, frames, out_at, out_d):
         for k in range(3):
             total = 0.0
             for i in range(m):
-                total += partial[j, i] * out_d[i, 2, k]
+                total += PARTIAL[j, i] * out_d[i, 2, k]
             out_at[j, k] = place[k] + h * total
 
 
@@ -150,11 +173,11 @@ def _moment(m0, force, at, out):
 
 
 @njit(cache=True)
-def _right_hand_sides(piece, h, rest, m0, force, frames, inner, moment, turn):
+def _right_hand_sides(piece, rest, m0, force, frames, inner, moment, turn):
     """Fill ``inner`` but for positions and directors, which it has."""
     for j in range(frames.shape[0]):
-        _moment(m0, force, inner.at[j], moment)
-        fm, fx = inner.fm[j], inner.fx[j]
+        at, fm = inner.at[j], inner.fm[j]
+        _moment(m0, force, at, moment)
         stage(
             frames[j],
             moment,
@@ -168,261 +191,278 @@ def _right_hand_sides(piece, h, rest, m0, force, frames, inner, moment, turn):
             inner.gq[j],
         )
         for a in range(4):
-            fx[a, 0] = fm[a, 1] * force[2] - fm[a, 2] * force[1]
-            fx[a, 1] = fm[a, 2] * force[0] - fm[a, 0] * force[2]
-            fx[a, 2] = fm[a, 0] * force[1] - fm[a, 1] * force[0]
-
-
-@njit(cache=True)
-def _matrix(rule, h, inner, out_w):
-    """The interval's matrix: slopes less what q' gains, directly and by the positions."""
-    m = inner.f.shape[0]
-    for j in range(m):
-        for a in range(4):
             row = 4 * j + a
-            for i in range(m):
-                for b in range(4):
-                    out_w[row, 4 * i + b] = 0.0
-                out_w[row, 4 * i + a] = rule.slope[j, i] / h
-            for b in range(4):
-                out_w[row, 4 * j + b] -= inner.fq[j, a, b]
-        for i in range(m):
-            factor = h * rule.partial[j, i]
-            for a in range(4):
-                x0 = factor * inner.fx[j, a, 0]
-                x1 = factor * inner.fx[j, a, 1]
-                x2 = factor * inner.fx[j, a, 2]
-                for b in range(4):
-                    out_w[4 * j + a, 4 * i + b] -= (
-                        x0 * inner.gq[i, 0, b] + x1 * inner.gq[i, 1, b] + x2 * inner.gq[i, 2, b]
-                    )
+            f1, f2, f3 = fm[a, 0], fm[a, 1], fm[a, 2]
+            inner.fp[0, row], inner.fp[1, row], inner.fp[2, row] = f1, f2, f3
+            inner.fp[3, row] = at[1] * f3 - at[2] * f2
+            inner.fp[4, row] = at[2] * f1 - at[0] * f3
+            inner.fp[5, row] = at[0] * f2 - at[1] * f1
+            inner.fx[0, row] = f2 * force[2] - f3 * force[1]
+            inner.fx[1, row] = f3 * force[0] - f1 * force[2]
+            inner.fx[2, row] = f1 * force[1] - f2 * force[0]
 
 
 @njit(cache=True)
-def _columns(rule, loads, h, node, frames, dq, dr, inner, out_w):
-    """The interval's right-hand sides: variations with p and gamma, and the residual's, last."""
-    m = inner.f.shape[0]
-    size, n_p, n_c = 4 * m, loads.shape[1], dq.shape[1]
-    for j in range(m):
-        at, fm, fx = inner.at[j], inner.fm[j], inner.fx[j]
-        for c in range(n_c):
-            v0, v1, v2 = 0.0, 0.0, 0.0  # of the moment, by p itself
-            if c < n_p:
-                v0 = loads[0, c] + loads[4, c] * at[2] - loads[5, c] * at[1]
-                v1 = loads[1, c] + loads[5, c] * at[0] - loads[3, c] * at[2]
-                v2 = loads[2, c] + loads[3, c] * at[1] - loads[4, c] * at[0]
-            for a in range(4):
-                out_w[4 * j + a, size + c] = (
-                    rule.slope_sum[j] * dq[a, c] / h
-                    + fm[a, 0] * v0
-                    + fm[a, 1] * v1
-                    + fm[a, 2] * v2
-                    + fx[a, 0] * dr[0, c]
-                    + fx[a, 1] * dr[1, c]
-                    + fx[a, 2] * dr[2, c]
-                )
-        for a in range(4):
-            residual = -rule.slope_sum[j] * node[a] / h - inner.f[j, a]
-            for i in range(m):
-                residual += rule.slope[j, i] * frames[i, a] / h
-            out_w[4 * j + a, size + n_c - 1] -= residual
-
-
-@njit(cache=True)
-def _carry(rule, h, frames, inner, z, node, place, out_node, out_place, out_dq, out_dr):
-    """Right end of an interval, with its variations, from the left one's and the stages'."""
-    m, n_c = inner.f.shape[0], out_dq.shape[1]
-    for a in range(4):
-        out_node[a] = rule.first * node[a]
+def _matrix(h, inner, out_w):
+    """The interval's matrix, times h: slopes less what q' gains, directly and by the positions."""
+    m, size = inner.f.shape[0], out_w.shape[1]
+    bent = inner.bent
+    for i in range(m):
         for j in range(m):
-            out_node[a] += rule.last[j] * frames[j, a]
-        for c in range(n_c):
-            total = rule.first * out_dq[a, c]
+            factor = -h * h * PARTIAL[j, i]
+            for row in range(4 * j, 4 * j + 4):
+                for k in range(3):
+                    bent[k, row] = factor * inner.fx[k, row]
+        for b in range(4):
+            column = 4 * i + b
+            g1, g2, g3 = inner.gq[i, 0, b], inner.gq[i, 1, b], inner.gq[i, 2, b]
+            for row in range(size):
+                out_w[column, row] = bent[0, row] * g1 + bent[1, row] * g2 + bent[2, row] * g3
             for j in range(m):
-                total += rule.last[j] * z[4 * j + a, c]
-            out_dq[a, c] = total
+                out_w[column, 4 * j + b] += SLOPE[j, i]
+            for a in range(4):
+                out_w[column, 4 * i + a] -= h * inner.fq[i, a, b]
+
+
+@njit(cache=True)
+def _columns(loads, h, node, frames, dq, dr, inner, out_w):
+    """The interval's right-hand sides, times h: variations with p, gamma; the residual's last."""
+    m, size = inner.f.shape[0], out_w.shape[1]
+    n_p, n_c = loads.shape[1], dq.shape[0]
+    for c in range(n_c):
+        column = size + c
+        for j in range(m):
+            for a in range(4):
+                out_w[column, 4 * j + a] = SLOPE_SUM[j] * dq[c, a]
+        r1, r2, r3 = h * dr[c, 0], h * dr[c, 1], h * dr[c, 2]
+        for row in range(size):
+            out_w[column, row] += (
+                r1 * inner.fx[0, row] + r2 * inner.fx[1, row] + r3 * inner.fx[2, row]
+            )
+        if c < n_p:
+            for k in range(6):
+                factor = h * loads[k, c]
+                if factor != 0.0:
+                    for row in range(size):
+                        out_w[column, row] += factor * inner.fp[k, row]
+    for j in range(m):
+        for a in range(4):
+            slope = -SLOPE_SUM[j] * node[a]
+            for i in range(m):
+                slope += SLOPE[j, i] * frames[i, a]
+            out_w[size + n_c - 1, 4 * j + a] -= slope - h * inner.f[j, a]
+
+
+@njit(cache=True)
+def _carry(h, frames, inner, z, node, place, out_node, out_place, out_dq, out_dr):
+    """Right end of an interval, with its variations, from the left one's and the stages'."""
+    m = inner.f.shape[0]
+    for a in range(4):
+        out_node[a] = FIRST * node[a]
+        for j in range(m):
+            out_node[a] += LAST[j] * frames[j, a]
     for k in range(3):
         out_place[k] = place[k]
         for j in range(m):
-            out_place[k] += h * rule.weights[j] * inner.d[j, 2, k]
-            for b in range(4):
-                factor = h * rule.weights[j] * inner.gq[j, k, b]
-                for c in range(n_c):
-                    out_dr[k, c] += factor * z[4 * j + b, c]
+            out_place[k] += h * WEIGHTS[j] * inner.d[j, 2, k]
+    for c in range(out_dq.shape[0]):
+        for a in range(4):
+            out_dq[c, a] *= FIRST
+        r1, r2, r3 = 0.0, 0.0, 0.0
+        for j in range(m):
+            for a in range(4):
+                change = z[c, 4 * j + a]
+                out_dq[c, a] += LAST[j] * change
+                moved = WEIGHTS[j] * change
+                r1 += moved * inner.gq[j, 0, a]
+                r2 += moved * inner.gq[j, 1, a]
+                r3 += moved * inner.gq[j, 2, a]
+        out_dr[c, 0] += h * r1
+        out_dr[c, 1] += h * r2
+        out_dr[c, 2] += h * r3
 
 
 @njit(cache=True)
-def _forward(rule, piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target):
+def _forward(piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target):
     """Eliminate all intervals, one after the other; returns the determinant's sign, 0 if singular.
 
-    Fills ``nodes``, ``places``, ``z`` (variations at the stages), ``dq`` and ``dr`` (at the far
-    end), and ``target`` (2, 4): the frame wanted there and its derivative by gamma.
+    Fills ``nodes``, ``places``, ``z`` (n, n_c, 4 m) (variations at the stages), ``dq`` (n_c, 4) and
+    ``dr`` (n_c, 3) (at the far end), and ``target`` (2, 4): the frame wanted there and its
+    derivative by gamma.
     """
     m0, force, moment = np.empty(3), np.empty(3), np.empty(3)
     turn, d_start = np.empty((3, 4)), np.empty(4)
-    size = 4 * rest.shape[1]
+    size = w.shape[1]
     _constants(piece.loads, p, m0, force)
     _ends(piece.quarter, piece.start, piece.end, p, gamma, nodes[0], d_start, target[0], target[1])
     dq[:] = 0.0
     dr[:] = 0.0
-    dq[:, 0 if piece.quarter else p.size] = d_start
+    dq[0 if piece.quarter else p.size] = d_start
     places[0] = 0.0
     sign = 1
     for i in range(len(h)):
-        _stages(rule.partial, h[i], places[i], frames[i], inner.at, inner.d)
-        _right_hand_sides(piece, h[i], rest[i], m0, force, frames[i], inner, moment, turn)
-        _matrix(rule, h[i], inner, w)
-        _columns(rule, piece.loads, h[i], nodes[i], frames[i], dq, dr, inner, w)
-        sign *= _eliminate(w, size)
+        _stages(h[i], places[i], frames[i], inner.at, inner.d)
+        _right_hand_sides(piece, rest[i], m0, force, frames[i], inner, moment, turn)
+        _matrix(h[i], inner, w)
+        _columns(piece.loads, h[i], nodes[i], frames[i], dq, dr, inner, w)
+        sign *= _eliminate(w)
         if sign == 0:
             return 0
-        z[i] = w[:, size:]
+        z[i] = w[size:]
         _carry(
-            rule,
-            h[i],
-            frames[i],
-            inner,
-            z[i],
-            nodes[i],
-            places[i],
-            nodes[i + 1],
-            places[i + 1],
-            dq,
-            dr,
+            h[i], frames[i], inner, z[i], nodes[i], places[i], nodes[i + 1], places[i + 1], dq, dr
         )
     return sign
 
 
 @njit(cache=True)
-def _border(rule, h, along, along_gamma, z, node, place, dq, dr, target, out):
-    """The small system: conditions at the far end, and the row of the tangent.
+def _border(h, along, along_gamma, z, node, place, dq, dr, target, out):
+    """The small system's columns: conditions at the far end, and the row of the tangent.
 
     Columns p, gamma | increment that removes the residual, orthogonal to the tangent | tangent.
     """
-    n_p = out.shape[0] - 1
+    n_p = out.shape[1] - 1
     G, R = n_p, n_p + 1
     n, m = along.shape[:2]
-    vec, q = np.empty(3), np.empty(4)
+    vec = np.empty(3)
     length = h.sum()
     out[:] = 0.0
     for c in range(R + 1):
-        for a in range(4):
-            q[a] = dq[a, c]
-        _vector_part(target[0], q, vec)
+        _vector_part(target[0], dq[c], vec)
         for k in range(3):
-            out[k, c] = vec[k]
+            out[c, k] = vec[k]
         for k in range(n_p - 3):  # r1, and r2 of a half
-            out[3 + k, c] = dr[k, c]
+            out[c, 3 + k] = dr[c, k]
     _vector_part(target[1], node, vec)
     for k in range(3):
-        out[k, G] += vec[k]
+        out[G, k] += vec[k]
     _vector_part(target[0], node, vec)
     for k in range(3):
-        out[k, R] += vec[k]
+        out[R, k] += vec[k]
     for k in range(n_p - 3):
-        out[3 + k, R] += place[k]
+        out[R, 3 + k] += place[k]
     for i in range(n):
         for j in range(m):
+            weight = 4.0 * h[i] * WEIGHTS[j] / length
             for a in range(4):
-                factor = 4.0 * h[i] * rule.weights[j] / length * along[i, j, a]
+                factor = weight * along[i, j, a]
                 for c in range(R + 1):
-                    out[n_p, c] += factor * z[i, 4 * j + a, c]
-    out[n_p, G] += along_gamma
-    out[:, R] *= -1.0
-    out[n_p, R + 1] = 1.0
+                    out[c, n_p] += factor * z[i, c, 4 * j + a]
+    out[G, n_p] += along_gamma
+    out[R] *= -1.0
+    out[R + 1, n_p] = 1.0
 
 
 @njit(cache=True)
-def _move(rule, h, z, step, rates, frames, out_tangent):
+def _move(h, z, step, rates, frames, out_tangent):
     """Add the increment to the frames; returns its size and the tangent's square, frames' part."""
     n, m = frames.shape[:2]
-    n_q = len(rates)  # p and gamma
+    n_q, rows = len(rates), z.shape[2]  # p and gamma; 4 m
+    change, along = np.empty(rows), np.empty(rows)
     size, square = 0.0, 0.0
     length = h.sum()
     for i in range(n):
+        for row in range(rows):
+            change[row], along[row] = z[i, n_q, row], 0.0
+        for c in range(n_q):
+            for row in range(rows):
+                change[row] += z[i, c, row] * step[c]
+                along[row] += z[i, c, row] * rates[c]
         for j in range(m):
+            part = 0.0
             for a in range(4):
-                change, along = z[i, 4 * j + a, n_q], 0.0
-                for c in range(n_q):
-                    change += z[i, 4 * j + a, c] * step[c]
-                    along += z[i, 4 * j + a, c] * rates[c]
-                frames[i, j, a] += change
-                size = max(size, abs(change))
-                out_tangent[i, j, a] = along
-                square += 4.0 * h[i] * rule.weights[j] / length * along * along
+                row = 4 * j + a
+                frames[i, j, a] += change[row]
+                size = max(size, abs(change[row]))
+                out_tangent[i, j, a] = along[row]
+                part += along[row] * along[row]
+            square += 4.0 * h[i] * WEIGHTS[j] / length * part
     return size, square
 
 
 @njit(cache=True)
 def correct(
-    rule, piece, h, rest, frames, p, gamma, along, along_gamma, by_gamma, iterations, tolerance
+    quarter,
+    stiffness,
+    start,
+    end,
+    loads,
+    h,
+    rest,
+    frames,
+    p,
+    gamma,
+    along,
+    along_gamma,
+    by_gamma,
+    iterations,
+    tolerance,
+    out_nodes,
+    out_places,
+    out_tangent,
+    out_tangent_p,
 ):
     """Newton's method from a guess, in place, and the tangent of the path at the result.
 
     Parameters
     ----------
-    rule : `gauss.Rule`; piece : `Piece`.
+    quarter, stiffness, start, end, loads : a `Piece`, whose parts are quicker to hand over.
     h : (n,) lengths of the intervals; rest : (n, m) k1u at the stages.
     frames : (n, m, 4), p : (n_p,), gamma : the guess; frames and p are overwritten.
     along : (n, m, 4), along_gamma : the tangent to which the step is orthogonal, and that orients
         the new one.
     by_gamma : whether gamma is given instead.
     iterations : at most; tolerance : of the last increment, whose square is the error left.
+    out_nodes : (n + 1, 4) frames and out_places : (n + 1, 3) positions less the first, at the mesh
+        points.
+    out_tangent : (n, m, 4), out_tangent_p : (n_p,), tangent_gamma; of unit length in the mean
+        square of rotations and gamma.
 
     Returns
     -------
     status : one of CONVERGED, DIVERGED, SLOW, SINGULAR.
-    done : iterations; size : the last increment.
+    done : iterations.
     gamma : of the result.
-    nodes : (n + 1, 4) frames and places : (n + 1, 3) positions less the first, at the mesh points.
-    tangent : (n, m, 4), tangent_p : (n_p,), tangent_gamma; of unit length in the mean square of
-        rotations and gamma.
-    rate : dM along it, M the moment of one arm.
+    tangent_gamma : see above.
+    rate : dM along the tangent, M the moment of one arm.
     orientation : sign of the determinant of the whole system, tangent row included.
+    moment, energy : M and the sector's U.
     """
+    piece = Piece(quarter, stiffness, start, end, loads)
     n, m = rest.shape
     n_p = p.size
     G, R = n_p, n_p + 1  # columns: p, gamma, residual
-    nodes, places = np.empty((n + 1, 4)), np.empty((n + 1, 3))
-    z = np.empty((n, 4 * m, n_p + 2))
-    dq, dr = np.empty((4, n_p + 2)), np.empty((3, n_p + 2))
-    w = np.empty((4 * m, 4 * m + n_p + 2))
-    inner = Inner(
-        np.empty((m, 3)),
-        np.empty((m, 3, 3)),
-        np.empty((m, 4)),
-        np.empty((m, 4, 4)),
-        np.empty((m, 4, 3)),
-        np.empty((m, 4, 3)),
-        np.empty((m, 3, 4)),
-    )
+    z = np.empty((n, n_p + 2, 4 * m))
+    dq, dr = np.empty((n_p + 2, 4)), np.empty((n_p + 2, 3))
+    w = np.empty((4 * m + n_p + 2, 4 * m))
+    inner = workspace(m)
     target = np.empty((2, 4))
-    small = np.empty((n_p + 1, n_p + 3))
-    tangent = np.zeros_like(frames)
-    tangent_p, tangent_gamma, rate = np.zeros(n_p), 0.0, 0.0
-    orientation, status, done, size = 0, SLOW, 0, np.inf
+    small = np.empty((n_p + 3, n_p + 1))
+    tangent_gamma, rate = 0.0, 0.0
+    orientation, status, done = 0, SLOW, 0
 
     while done < iterations:
         done += 1
         orientation = _forward(
-            rule, piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target
+            piece, h, rest, frames, p, gamma, out_nodes, out_places, z, dq, dr, inner, w, target
         )
         if orientation != 0:
-            _border(rule, h, along, along_gamma, z, nodes[n], places[n], dq, dr, target, small)
-            orientation *= _eliminate(small, n_p + 1)
-        if orientation == 0 or (by_gamma and small[G, R + 1] == 0.0):
+            _border(h, along, along_gamma, z, out_nodes[n], out_places[n], dq, dr, target, small)
+            orientation *= _eliminate(small)
+        if orientation == 0 or (by_gamma and small[R + 1, G] == 0.0):
             status = SINGULAR
             break
-        step, rates = small[:, R].copy(), small[:, R + 1].copy()
+        step, rates = small[R], small[R + 1]
         if by_gamma:  # less what the tangent adds to gamma
             step -= step[G] / rates[G] * rates
             step[G] = 0.0
-        size, square = _move(rule, h, z, step, rates, frames, tangent)
+        size, square = _move(h, z, step, rates, frames, out_tangent)
         unit = 1.0 / np.sqrt(square + rates[G] * rates[G])
-        tangent *= unit
-        tangent_p, tangent_gamma = unit * rates[:n_p], unit * rates[G]
-        rate = unit * _moment_rate(piece.loads, p, places[n], dr, rates)
+        out_tangent *= unit
+        tangent_gamma = unit * rates[G]
+        rate = unit * _moment_rate(loads, p, out_places[n], dr, rates)
         for c in range(n_p):
+            out_tangent_p[c] = unit * rates[c]
             p[c] += step[c]
             size = max(size, abs(step[c]) / (1.0 + abs(p[c])))
         gamma += step[G]
@@ -434,19 +474,8 @@ def correct(
             status = CONVERGED
             break
 
-    return (
-        status,
-        done,
-        size,
-        gamma,
-        nodes,
-        places,
-        tangent,
-        tangent_p,
-        tangent_gamma,
-        rate,
-        orientation,
-    )
+    moment, energy = observe(piece, h, rest, frames, p)
+    return status, done, gamma, tangent_gamma, rate, orientation, moment, energy
 
 
 @njit(cache=True)
@@ -456,14 +485,14 @@ def _moment_rate(loads, p, place, dr, rates):
     _constants(loads, p, m0, force)
     total = 0.0
     for c in range(len(rates)):
-        total -= rates[c] * (force[0] * dr[1, c] - force[1] * dr[0, c])
+        total -= rates[c] * (force[0] * dr[c, 1] - force[1] * dr[c, 0])
         if c < len(p):
             total -= rates[c] * (loads[2, c] + loads[3, c] * place[1] - loads[4, c] * place[0])
     return total
 
 
 @njit(cache=True)
-def observe(rule, piece, h, rest, frames, p):
+def observe(piece, h, rest, frames, p):
     """Moment of one arm M = -m3 at the end, and the sector's energy; (A.7), (A.21)."""
     n, m = rest.shape
     m0, force, moment = np.empty(3), np.empty(3), np.empty(3)
@@ -472,14 +501,14 @@ def observe(rule, piece, h, rest, frames, p):
     _constants(piece.loads, p, m0, force)
     energy = 0.0
     for i in range(n):
-        _stages(rule.partial, h[i], place, frames[i], at, d)
+        _stages(h[i], place, frames[i], at, d)
         for j in range(m):
             _moment(m0, force, at[j], moment)
             for k in range(3):
                 local = d[j, k, 0] * moment[0] + d[j, k, 1] * moment[1] + d[j, k, 2] * moment[2]
-                energy += 0.5 * h[i] * rule.weights[j] * local * local / piece.stiffness[k]
+                energy += 0.5 * h[i] * WEIGHTS[j] * local * local / piece.stiffness[k]
         for j in range(m):
             for k in range(3):
-                place[k] += h[i] * rule.weights[j] * d[j, 2, k]
+                place[k] += h[i] * WEIGHTS[j] * d[j, 2, k]
     _moment(m0, force, place, moment)
     return -moment[2], energy

@@ -48,9 +48,10 @@ def stage(q, moment, rest, stiffness, d, turn, out_f, out_fq, out_fm, out_gq):
     """
     a, b, c, e = q[0], q[1], q[2], q[3]
     m1, m2, m3 = moment[0], moment[1], moment[2]
-    k1 = rest + (d[0, 0] * m1 + d[0, 1] * m2 + d[0, 2] * m3) / stiffness[0]
-    k2 = (d[1, 0] * m1 + d[1, 1] * m2 + d[1, 2] * m3) / stiffness[1]
-    k3 = (d[2, 0] * m1 + d[2, 1] * m2 + d[2, 2] * m3) / stiffness[2]
+    i1, i2, i3 = 1.0 / stiffness[0], 1.0 / stiffness[1], 1.0 / stiffness[2]
+    k1 = rest + (d[0, 0] * m1 + d[0, 1] * m2 + d[0, 2] * m3) * i1
+    k2 = (d[1, 0] * m1 + d[1, 1] * m2 + d[1, 2] * m3) * i2
+    k3 = (d[2, 0] * m1 + d[2, 1] * m2 + d[2, 2] * m3) * i3
     out_f[0] = 0.5 * (-b * k1 - c * k2 - e * k3)
     out_f[1] = 0.5 * (a * k1 - e * k2 + c * k3)
     out_f[2] = 0.5 * (e * k1 + a * k2 - b * k3)
@@ -64,7 +65,6 @@ def stage(q, moment, rest, stiffness, d, turn, out_f, out_fq, out_fm, out_gq):
     s1 = 2.0 * (m1 * b + m2 * c + m3 * e)
     s2 = 2.0 * (-m1 * c + m2 * b - m3 * a)
     s3 = 2.0 * (-m1 * e + m2 * a + m3 * b)
-    i1, i2, i3 = 1.0 / stiffness[0], 1.0 / stiffness[1], 1.0 / stiffness[2]
     for row in range(4):
         t1, t2, t3 = turn[0, row] * i1, turn[1, row] * i2, turn[2, row] * i3
         out_fq[row, 0] = t1 * s0 + t2 * s3 - t3 * s2

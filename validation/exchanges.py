@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 
 from validation.collocation import Collocation
-from validation.corrector import Inner, _border, _forward, _move
+from validation.corrector import _border, _forward, _move, workspace
 from validation.gauss import Array
 from validation.meshes import Mesh
 
@@ -53,50 +53,41 @@ class Centre(NamedTuple):
 
 
 @njit(cache=True)
-def _shoot(rule, piece, h, rest, frames, p, gamma, iterations, tolerance):
+def _shoot(piece, h, rest, frames, p, gamma, iterations, tolerance):
     """Newton's method for the frames alone, in place; mesh points, G and G_x."""
     n, m = rest.shape
     n_p = p.size
     nodes, places = np.empty((n + 1, 4)), np.empty((n + 1, 3))
-    z = np.empty((n, 4 * m, n_p + 2))
-    dq, dr = np.empty((4, n_p + 2)), np.empty((3, n_p + 2))
-    w = np.empty((4 * m, 4 * m + n_p + 2))
-    inner = Inner(
-        np.empty((m, 3)),
-        np.empty((m, 3, 3)),
-        np.empty((m, 4)),
-        np.empty((m, 4, 4)),
-        np.empty((m, 4, 3)),
-        np.empty((m, 4, 3)),
-        np.empty((m, 3, 4)),
-    )
+    z = np.empty((n, n_p + 2, 4 * m))
+    dq, dr = np.empty((n_p + 2, 4)), np.empty((n_p + 2, 3))
+    w = np.empty((4 * m + n_p + 2, 4 * m))
+    inner = workspace(m)
     target = np.empty((2, 4))
-    small = np.empty((n_p + 1, n_p + 3))
+    small = np.empty((n_p + 3, n_p + 1))
     along = np.zeros_like(frames)
     still = np.zeros(n_p + 1)
     ok = False
     for _ in range(iterations):
         sign = _forward(
-            rule, piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target
+            piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target
         )
         if sign == 0:
             break
-        size, _square = _move(rule, h, z, still, still, frames, along)
+        size, _square = _move(h, z, still, still, frames, along)
         if not size < 2.0:
             break
         if size < tolerance:
             ok = True
             break
     along[:] = 0.0
-    _border(rule, h, along, 1.0, z, nodes[n], places[n], dq, dr, target, small)
-    return ok, nodes, places, -small[:n_p, n_p + 1], small[:n_p, : n_p + 1].copy()
+    _border(h, along, 1.0, z, nodes[n], places[n], dq, dr, target, small)
+    return ok, nodes, places, -small[n_p + 1, :n_p], small[: n_p + 1, :n_p].T.copy()
 
 
 def shot(system: Collocation, mesh: Mesh, frames: Array, x: Array) -> Shot:
     """The rod shot with p and gamma, from frames nearby."""
     frames = frames.copy()
     ok, nodes, places, missed, rates = _shoot(
-        system.rule,
         system.sector.piece,
         mesh.h,
         mesh.rest,

@@ -32,8 +32,8 @@ class Mesh:
 
     @cached_property
     def weights(self) -> Array:
-        """Weights (n, m) of the mean square of rotations: |dq|^2 is a quarter of theirs."""
-        return 4.0 / self.sector.length * self.h[:, None] * self.rule.weights
+        """Weights (n, m, 1) of the mean square of rotations: |dq|^2 is a quarter of theirs."""
+        return 4.0 / self.sector.length * (self.h[:, None] * self.rule.weights)[..., None]
 
     @cached_property
     def halved(self) -> Mesh:

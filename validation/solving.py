@@ -7,12 +7,11 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import cache
-from importlib.metadata import version
 
 import numpy as np
 
 from der.checks import checked_number, counts
-from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode
+from der.record import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode, release
 from der.ring import circle
 from der.scene import Scene
 from der.sections import section
@@ -195,7 +194,7 @@ def _record(
             "gamma_max": scene.gamma_max,
             "until": scene.until,
             "save_at": None if scene.save_at is None else list(scene.save_at),
-            "version": version("ring-origami"),
+            "version": release(),
         },
         gamma=gamma,
         moment=moments,
