@@ -59,9 +59,11 @@ def test_turn_of_a_cubic_is_where_its_rate_vanishes(coefficients):
     assert turn_of(c0, c1, c2) == pytest.approx(inside[0], abs=1e-14)
 
 
-def test_slowest_place_is_told_where_the_rate_may_change_its_sign():
-    """Of rates (u - 1/2)^2 + c: at 1/2 where c is below a tenth of the first, else nowhere."""
-    assert slowest(0.25 - 0.01, -1.0, 1.0) == 0.5
-    assert slowest(0.25 + 0.1, -1.0, 1.0) is None
+def test_slowest_place_is_where_the_rate_turns_between_equal_signs():
+    """Of rates (u - 1/2)^2 + c, and of what has its largest there, or turns at no place inside."""
+    assert slowest(0.25 - 0.01, -1.0, 1.0) == pytest.approx((0.5, -0.01))
+    assert slowest(-0.25 - 0.1, 1.0, -1.0) == pytest.approx((0.5, -0.1))
     assert slowest(1.0, -3.0, 1.0) is None  # unequal signs at the ends
     assert slowest(1.0, 0.0, 0.0) is None
+    assert slowest(1.0, 1.0, -1.0) is None
+    assert slowest(1.0, 1.0, 1.0) is None

@@ -35,6 +35,9 @@ IN_VAIN = 4.0  # times the intervals, which at order 8 leave 2e-5 of an error: w
 REMAINS = 0.5  # half of it or more, what is left is rounding
 SAFETY = 0.25  # of the tolerance: the error aimed at
 NEGLIGIBLE = 1e-3  # of the tolerance: square of a step's last increment, about the error left
+ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
+HALVED = 0.25  # of what it was wrong by: on a part of the interval
+NARROW = 1e-6  # of a step: places that lie closer are one
 EIGHTH = math.pi / 8.0
 
 
@@ -416,25 +419,38 @@ def _of_moment(at: Solution) -> tuple[float, float]:
 
 
 def _turns(
-    step: Step, value: Callable[[Solution], tuple[float, float]], a: Mark, b: Mark
+    step: Step,
+    value: Callable[[Solution], tuple[float, float]],
+    a: Mark,
+    b: Mark,
+    off: float | None = None,
 ) -> Iterator[float]:
     """Places between two marks where a value turns back.
 
-    Two of them that lie close together show at the marks only by the cubic through these.
+    Two of them that lie close together show at the marks only by the cubic through these. Where it
+    is slowest is looked at, and the two halves again.
+
+    Parameters
+    ----------
+    off : by how much the rate of the cubic may be wrong; None: not known.
     """
     (low, first), (high, last) = value(a.at), value(b.at)
     length = b.s - a.s
-    rates = length * first / step.cosine(a.at), length * last / step.cosine(b.at)
-    cubic = rate_of_cubic(high - low, *rates)
+    first, last = first / step.cosine(a.at), last / step.cosine(b.at)
+    cubic = rate_of_cubic(high - low, length * first, length * last)
     if first * last < 0.0:
         guess = a.s + length * turn_of(*cubic)
         yield root(lambda s: value(step.at(s))[1], a.s, b.s, guess)
-    elif (u := slowest(*cubic)) is not None:
-        s = a.s + length * u
-        middle = Mark(s, step.at(s), "")
-        if first * value(middle.at)[1] < 0.0:
-            yield from _turns(step, value, a, middle)
-            yield from _turns(step, value, middle, b)
+    elif length > NARROW * step.length and (place := slowest(*cubic)) is not None:
+        expected = place[1] / length
+        off = ASLANT * abs(first) if off is None else off
+        if math.copysign(1.0, first) * expected < off:
+            s = a.s + length * place[0]
+            middle = Mark(s, step.at(s), "")
+            found = value(middle.at)[1] / step.cosine(middle.at)
+            off = HALVED * abs(found - expected)
+            yield from _turns(step, value, a, middle, off)
+            yield from _turns(step, value, middle, b, off)
 
 
 def _at_targets(wanted: Wanted, step: Step, folds: list[Mark]) -> tuple[list[Mark], bool]:

@@ -50,13 +50,12 @@ def rate_of_cubic(jump: float, first: float, last: float) -> tuple[float, float,
     return first, 6.0 * jump - 4.0 * first - 2.0 * last, 3.0 * (first + last - 2.0 * jump)
 
 
-def slowest(c0: float, c1: float, c2: float) -> float | None:
-    """Where a cubic's rate is smallest between two equal signs, if it may change sign there."""
+def slowest(c0: float, c1: float, c2: float) -> tuple[float, float] | None:
+    """Where a cubic's rate is smallest between two equal signs, and that rate; None at an end."""
     if c0 * (c0 + c1 + c2) <= 0.0 or c2 == 0.0:
         return None
     u = -c1 / (2.0 * c2)
-    may_turn = 0.0 < u < 1.0 and (c0 + (c1 + c2 * u) * u) * c0 < 0.1 * c0 * c0
-    return u if may_turn else None
+    return (u, c0 + (c1 + c2 * u) * u) if 0.0 < u < 1.0 and c0 * c2 > 0.0 else None
 
 
 def turn_of(c0: float, c1: float, c2: float) -> float:
