@@ -51,7 +51,9 @@ def checked_number(
         If `value` is not a number (a bool and a string are none), not finite, or not allowed.
     """
     number = math.nan
-    if isinstance(value, Real) and not isinstance(value, bool):
+    if type(value) is float:  # most are: to ask what else is a number takes longer
+        number = value
+    elif isinstance(value, Real) and not isinstance(value, bool):
         with suppress(OverflowError):  # an int too large for a float stays nan
             number = float(value)
     if math.isfinite(number) and is_allowed(number):
