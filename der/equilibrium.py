@@ -44,6 +44,7 @@ class Outcome(IntEnum):
     SINGULAR = 4
 
 
+_OUTCOMES = tuple(Outcome)
 ADVICE = {
     Outcome.CONVERGED: "converged",
     Outcome.TOO_MANY_ITERATIONS: "Newton's method did not converge; try a closer start",
@@ -59,27 +60,6 @@ class Direction(NamedTuple):
     q: Array  # (n, b) rotation vectors in the frames, and stretch
     force: Array  # (n_c,)
     load: float
-
-
-class Correction(NamedTuple):
-    """What the kernel returns; see `Equilibrium` for the meaning of the entries."""
-
-    outcome: int
-    where: int
-    iterations: int
-    residual: float
-    quat: Array
-    stretch: Array
-    force: Array
-    load: float
-    energy: float
-    moment: float
-    q_rate: Array
-    force_rate: Array
-    load_rate: float
-    moment_rate: float
-    negative: int
-    margin: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,22 +91,37 @@ class Equilibrium:
 
 
 @njit(cache=True)
+def product(mass, a, b):
+    """Mass-weighted inner product of two (n, b); ``mass`` (n, 1)."""
+    total = 0.0
+    for j in range(a.shape[0]):
+        for i in range(a.shape[1]):
+            total += mass[j, 0] * a[j, i] * b[j, i]
+    return total
+
+
+@njit(cache=True)
 def _correct(
     cell, length, mass, rest, stiffness, stretching, measure, closed,
     free, weight, axis, target, turn, turn_axis, pull, reach,
-    quat, stretch, force, load, control, row, row_load, moment, tolerance, most,
+    quat, stretch, force, load, control, along, along_load, moment, tolerance, most,
 ):  # fmt: skip
-    """Newton's method; ``row`` (n, b) and ``row_load`` are the mass-weighted direction.
+    """Newton's method; ``along`` (n, b) and ``along_load`` are the direction.
 
-    Rod and supports come field by field: numba is slow to take named tuples apart.
+    Rod and supports come field by field: numba is slow to take named tuples apart. For what is
+    returned see `Equilibrium`.
     """
     rod = Rod(cell, length, mass, rest, stiffness, stretching, measure, closed)
     held = Supports(free, weight, axis, target, turn, turn_axis, pull, reach)
     n, b = held.free.shape
     n_c = held.target.shape[0]
     quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
-    x, y, z = np.zeros((n, b, 1)), np.zeros((n_c, 1)), np.zeros(1)
-    no_row, no_border = np.zeros((n, b)), np.zeros(n_c)
+    q_rate, force_rate = np.zeros((n, b)), np.zeros(n_c)  # corrections, and the tangent at last
+    x, y, z = q_rate.reshape((n, b, 1)), force_rate.reshape((n_c, 1)), np.zeros(1)  # the same
+    row, no_row, no_border = np.empty((n, b)), np.zeros((n, b)), np.zeros(n_c)
+    for j in range(n):
+        for i in range(b):
+            row[j, i] = mass[j, 0] * along[j, i]
     negative, margin, moment_rate, first = -1, 0.0, 0.0, 0.0
     outcome, iteration = 1, 0
     while True:
@@ -147,19 +142,19 @@ def _correct(
         hold(held.free, diag, off, border)
         for j in range(n):
             for i in range(b):
-                x[j, i, 0] = -system.grad[j, i]
+                q_rate[j, i] = -system.grad[j, i]
+                if done or not held.free[j, i]:
+                    q_rate[j, i] = 0.0
                 if not held.free[j, i]:
-                    x[j, i, 0] = 0.0
                     column[j, i] = 0.0
         for k in range(n_c):
-            y[k, 0] = -system.gap[k]
+            force_rate[k] = 0.0 if done else -system.gap[k]
         z[0] = 0.0
         factors = factor(diag, off, border)
         # the closing row: of the direction for the tangent, else that of the control
-        last, last_border, corner = row, no_border, row_load
+        last, last_border, corner = row, no_border, along_load
         if done:
             negative, margin = inertia(factors)
-            x, y = np.zeros((n, b, 1)), np.zeros((n_c, 1))
             z[0] = 1.0
         elif control == 0:
             last, corner = no_row, 1.0
@@ -184,7 +179,7 @@ def _correct(
             outcome = 4
             break
         if done:
-            moment_rate = _normalise(rod, system, column, x, y, z)
+            moment_rate = _normalise(rod, system, column, q_rate, force_rate, z)
             outcome = 0
             break
         if control == 0:
@@ -192,32 +187,17 @@ def _correct(
         largest = abs(z[0])
         for j in range(n):
             for i in range(3):
-                largest = max(largest, abs(x[j, i, 0]))
+                largest = max(largest, abs(q_rate[j, i]))
         if not largest < _LARGEST_TURN:
             outcome = 2
             break
-        _move(held, quat, stretch, force, x, y, z[0])
+        _move(turn, turn_axis, quat, stretch, force, q_rate, force_rate, z[0])
         load += z[0]
         iteration += 1
-    # a plain tuple: to make a named one runs Python, in which Ctrl-C would end the process
-    return (
-        outcome,
-        system.bent_too_far,
-        iteration,
-        residual,
-        quat,
-        stretch,
-        force,
-        load,
-        system.energy,
-        system.load_grad,
-        x,
-        y,
-        z[0],
-        moment_rate,
-        negative,
-        margin,
-    )
+    # plain tuples: to make a named one runs Python, in which Ctrl-C would end the process
+    state, tangent = (quat, stretch, force, load), (q_rate, force_rate, z[0])
+    ends = (system.bent_too_far, iteration, residual, system.energy, system.load_grad)
+    return outcome, state, ends, tangent, (moment_rate, negative, margin)
 
 
 @njit(cache=True)
@@ -238,45 +218,49 @@ def _residual(held, system, control, moment):
 
 @njit(cache=True)
 def _normalise(rod, system, column, x, y, z):
-    """Scale a tangent in place to unit mass-weighted norm; returns d(dL/dload) along it."""
-    n, b, _ = x.shape
-    norm = z[0] * z[0]
-    for j in range(n):
-        for i in range(b):
-            norm += rod.mass[j, 0] * x[j, i, 0] ** 2
-    scale = 1.0 / np.sqrt(norm)
+    """Scale a tangent (n, b), (n_c,), (1,) in place to unit norm; returns d(dL/dload) along it."""
+    n, b = x.shape
+    scale = 1.0 / np.sqrt(product(rod.mass, x, x) + z[0] * z[0])
     z[0] *= scale
     rate = system.load_hess * z[0]
     for j in range(n):
         for i in range(b):
-            x[j, i, 0] *= scale
-            rate += column[j, i] * x[j, i, 0]
+            x[j, i] *= scale
+            rate += column[j, i] * x[j, i]
     for k in range(y.shape[0]):
-        y[k, 0] *= scale
-        rate += system.load_border[k] * y[k, 0]
+        y[k] *= scale
+        rate += system.load_border[k] * y[k]
     return rate
 
 
 @njit(cache=True)
-def _move(held, quat, stretch, force, dq, dforce, dload):
-    """Add an increment ``dq`` (n, b, 1), ``dforce`` (n_c, 1) to the other arrays, in place.
+def _move(turn, turn_axis, quat, stretch, force, dq, dforce, dload):
+    """Add an increment ``dq`` (n, b), ``dforce`` (n_c,) to the three arrays before, in place.
 
     The frames that turn with the load turn about a fixed axis, so theirs is exact at any angle.
     """
-    n, b, _ = dq.shape
+    n, b = dq.shape
     axis = np.empty(3)
     for j in range(n):
         for i in range(3):
-            axis[i] = dq[j, i, 0]
-        if held.turn[j] != 0.0:
-            into_frame(quat[j], held.turn_axis, axis)
+            axis[i] = dq[j, i]
+        if turn[j] != 0.0:
+            into_frame(quat[j], turn_axis, axis)
             for i in range(3):
-                axis[i] *= held.turn[j] * dload
+                axis[i] *= turn[j] * dload
         turned(quat[j], axis, quat[j])
         if b == 4:
-            stretch[j] += dq[j, 3, 0]
+            stretch[j] += dq[j, 3]
     for k in range(force.shape[0]):
-        force[k] += dforce[k, 0]
+        force[k] += dforce[k]
+
+
+@njit(cache=True)
+def _moved(turn, turn_axis, quat, stretch, force, dq, dforce, dload):
+    """Copies of frames (n, 4), stretch (n,) and forces (n_c,), moved by an increment."""
+    quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
+    _move(turn, turn_axis, quat, stretch, force, dq, dforce, dload)
+    return quat, stretch, force
 
 
 def dot(body: Rod, a: Direction, b: Direction) -> float:
@@ -284,13 +268,15 @@ def dot(body: Rod, a: Direction, b: Direction) -> float:
 
     Forces do not enter.
     """
-    return float(np.vdot(body.mass * a.q, b.q)) + a.load * b.load
+    return float(product(body.mass, a.q, b.q)) + a.load * b.load
 
 
 def moved(held: Supports, state: State, step: Direction) -> State:
     """``state`` moved by the increment ``step``."""
-    quat, stretch, force = state.quat.copy(), state.stretch.copy(), state.force.copy()
-    _move(held, quat, stretch, force, step.q[:, :, None], step.force[:, None], step.load)
+    quat, stretch, force = _moved(
+        held.turn, held.turn_axis, state.quat, state.stretch, state.force, step.q, step.force,
+        step.load,
+    )  # fmt: skip
     return State(quat, stretch, force, state.load + step.load)
 
 
@@ -325,35 +311,33 @@ def equilibrium(
     """
     check_cut(body, held.free)
     if along is None:
-        row, row_load = np.zeros(held.free.shape), 1.0
-    else:
-        row, row_load = body.mass * along.q, along.load
-    c = Correction(
-        *_correct(
-            *body,
-            *held,
-            start.quat,
-            start.stretch,
-            start.force,
-            float(start.load),
-            int(control),
-            row,
-            row_load,
-            moment,
-            tolerance,
-            iterations,
-        )
+        along = Direction(np.zeros(held.free.shape), np.zeros(len(held.target)), 1.0)
+    outcome, state, ends, tangent, rates = _correct(
+        *body,
+        *held,
+        start.quat,
+        start.stretch,
+        start.force,
+        float(start.load),
+        int(control),
+        along.q,
+        along.load,
+        moment,
+        tolerance,
+        iterations,
     )
+    where, taken, residual, energy, generalised = ends
+    moment_rate, negative, margin = rates
     return Equilibrium(
-        State(c.quat, c.stretch, c.force, c.load),
-        Outcome(c.outcome),
-        c.where,
-        c.iterations,
-        c.residual,
-        c.energy,
-        c.moment,
-        Direction(c.q_rate[:, :, 0], c.force_rate[:, 0], c.load_rate),
-        c.moment_rate,
-        c.negative,
-        c.margin,
+        State(*state),
+        _OUTCOMES[outcome],
+        where,
+        taken,
+        residual,
+        energy,
+        generalised,
+        Direction(*tangent),
+        moment_rate,
+        negative,
+        margin,
     )

@@ -145,7 +145,7 @@ class _Corrections:
     last: Array  # (n, 6) T20 - T10
     exact: NDArray[np.bool_]  # (n,) the same on every mesh; or no state
     rest: float  # what the corrections left out may add, as a fraction of the first
-    scales: Array  # (6,)
+    remainder: Array  # (n, 6) the same, in the columns of the table
 
     @classmethod
     def of(cls, places: Sequence[Place | None], scales: Array) -> _Corrections:
@@ -159,7 +159,9 @@ class _Corrections:
         exact = sizes[:, 0] < _EXACT
         small = _SMALL * sizes[:, 0].max(initial=0.0)
         ratio = (sizes[~exact, 1] / np.maximum(sizes[~exact, 0], small)).max(initial=0.0)
-        return cls(places, first, last, exact, _REST * ratio * ratio, scales)
+        rest = float(_REST * ratio * ratio)
+        halves = np.linalg.norm((first / scales).reshape(-1, 2, RATE), axis=2)
+        return cls(places, first, last, exact, rest, rest * scales * np.repeat(halves, RATE, 1))
 
     def bound(self, k: int) -> Array | None:
         """Errors (3,) of the values at a place; None where they are not known.
@@ -181,12 +183,7 @@ class _Corrections:
             return np.abs(place.spread @ self.last[k]) + floor
         near = [j for j in (k - 1, k, k + 1) if 0 <= j < len(self.places) and not self.exact[j]]
         last = np.abs(self.last[near] @ place.spread.T).max(axis=0)
-        return last + np.abs(place.spread) @ self.remainder(k) + floor
-
-    def remainder(self, k: int) -> Array:
-        """What the corrections left out may add to the columns of the table (6,)."""
-        halves = (self.first[k] / self.scales).reshape(2, RATE)
-        return self.rest * self.scales * np.repeat(np.linalg.norm(halves, axis=1), RATE)
+        return last + np.abs(place.spread) @ self.remainder[k] + floor
 
 
 def _slope_at_pi(
@@ -204,7 +201,7 @@ def _slope_at_pi(
     change = romberg(
         (place.bend[:, MOMENT] - moment_rate / gamma_rate * place.bend[:, GAMMA]) / gamma_rate
     )[-1]
-    away = (abs(corrections.last[k, GAMMA]) + corrections.remainder(k)[GAMMA]) / gamma_rate[0]
+    away = (abs(corrections.last[k, GAMMA]) + corrections.remainder[k, GAMMA]) / gamma_rate[0]
     error = abs(twice - once) + corrections.rest * abs(once - plain) + abs(change * away)
     return float(twice), float(error)
 

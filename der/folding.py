@@ -97,7 +97,7 @@ def fold(
                 if progress is not None:
                     progress(visit.at.state.load)
                 if watch is not None:
-                    watch(piece.shape(visit.at.state)[0])
+                    watch(piece.vertices(visit.at.state))
                 if pressed:
                     raise KeyboardInterrupt
             message = NEVER if visits[-1].at.state.load == -scene.gamma_max else ""
@@ -247,7 +247,7 @@ def _load_kernels(stability: bool, contacts: bool, *, snaps: bool) -> None:
     for _ in follow(piece, Wanted(load_max=0.1, stability=stability, contacts=contacts), Tally()):
         pass
     if contacts:
-        x, _ = piece.shape(piece.start)
+        x = piece.vertices(piece.start)
         gap(x, *nearest_strands(x, x))
 
 

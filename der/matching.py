@@ -32,6 +32,8 @@ LEVELS = 3
 GAMMA, MOMENT, ENERGY = 0, 1, 2  # columns of a table of values
 RATE = 3  # added to these: columns of the rates along the path
 
+# weights of the values at h, 2h and 4h: (4, -1)/3 for one term, and (16, -1)/15 of two such
+_ROMBERG = np.array([[1.0, 0.0, 0.0], [4.0 / 3.0, -1.0 / 3.0, 0.0], [64 / 45, -20 / 45, 1 / 45]])
 _PROBE = 1e-3  # of s: the first step towards a fold or limit, whose second derivative is not known
 _SMALL = 1e-6  # of s: a step that is as good as its linear prediction, to the square of this
 FARTHEST = 0.3  # of s: about two steps of the path; what is sought lies h^2 away
@@ -115,8 +117,8 @@ def romberg(levels: Array) -> Array:
     ----------
     levels : (3, ...) values at h, 2h and 4h, with errors in even powers of h.
     """
-    once = (4.0 * levels[:-1] - levels[1:]) / 3.0
-    return np.array([levels[0], once[0], (16.0 * once[0] - once[1]) / 15.0])
+    extrapolated: Array = _ROMBERG @ levels
+    return extrapolated
 
 
 @dataclass(frozen=True)

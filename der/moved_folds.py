@@ -17,7 +17,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from der.frames import Array, rotation_vector
+from der.chords import between
+from der.equilibrium import dot
+from der.frames import Array
 from der.matching import FARTHEST, GAMMA, Family, Place, placed, romberg
 from der.sector import Sector
 from der.special import Visit, Wanted, visit
@@ -25,12 +27,10 @@ from der.special import Visit, Wanted, visit
 
 def arc_lengths(piece: Sector, visits: Sequence[Visit]) -> Array:
     """Distances (n,) of the visits from the first, along chords, in the norm of the path."""
-    mass, steps = piece.body.mass, [0.0] * bool(visits)
-    for a, b in pairwise(visits):
-        turn = rotation_vector(a.at.state.quat, b.at.state.quat)
-        turn[~piece.held.free[:, :3]] = 0.0
-        rise = b.at.state.load - a.at.state.load
-        steps.append(math.sqrt(float(np.sum(mass * turn**2)) + rise * rise))
+    steps = [0.0] * bool(visits)
+    for a, b in pairwise(one.at.state for one in visits):
+        jump = between(piece.held, a, b)
+        steps.append(math.sqrt(dot(piece.body, jump, jump)))
     return np.cumsum(steps)
 
 

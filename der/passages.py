@@ -11,9 +11,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from der.frames import Array
-from der.linking import vertices
-from der.rod import State
 from der.step import Step, root
 
 _TURN = 3.0  # rad; an arc has to turn by pi to meet itself (Fenchel)
@@ -119,7 +116,7 @@ def passage(step: Step, low: float, high: float) -> float | None:
     Stuck
         Where Newton's method fails there.
     """
-    shapes = [_shape(step, step.expected(s)) for s in (low, high)]
+    shapes = [step.piece.vertices(step.expected(s)) for s in (low, high)]
     i, k = nearest_strands(*shapes)
     if i < 0:
         return None
@@ -128,7 +125,8 @@ def passage(step: Step, low: float, high: float) -> float | None:
         return None
 
     def apart(s: float) -> float:
-        known[s] = known[s] if s in known else float(gap(_shape(step, step.expected(s)), i, k))
+        if s not in known:
+            known[s] = float(gap(step.piece.vertices(step.expected(s)), i, k))
         return known[s]
 
     s = root(apart, low, high, _PLACE)
@@ -143,9 +141,3 @@ def passage(step: Step, low: float, high: float) -> float | None:
         if not low < s < high:
             return None
     return s
-
-
-def _shape(step: Step, state: State) -> Array:
-    """Vertices (N, 3) of the ring."""
-    x: Array = vertices(step.piece.full_frames(state), step.piece.full_lengths(state))
-    return x

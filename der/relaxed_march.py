@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from der import relaxation
+from der.chords import between
 from der.equilibrium import Direction, Equilibrium, moved
 from der.relaxation import Relaxed, relax
 from der.rod import State
@@ -19,7 +20,7 @@ from der.sector import Sector
 from der.snap import Landing
 from der.special import Visit, Wanted
 from der.step import Stuck, Tally
-from der.trail import CLOSE, ahead, change, is_work, longer, rested, went_on
+from der.trail import CLOSE, ahead, is_work, longer, rested, went_on
 
 RISE = math.pi / 64.0  # rad, step of a march by dynamic relaxation alone
 RESOLUTION = 1e-6  # rad, of where such a march finds a snap
@@ -222,7 +223,7 @@ def _vertex(trail: list[Equilibrium]) -> float:
 def _between(walk: _Walk, a: Equilibrium, c: Equilibrium, load: float) -> Equilibrium:
     """The relaxed state at a load between those of two others."""
     part = (load - a.state.load) / (c.state.load - a.state.load)
-    step = change(walk.piece, a.state, c.state)
+    step = between(walk.piece.held, a.state, c.state)
     guess = Direction(part * step.q, 0.0 * step.force, load - a.state.load)
     found = walk.relaxed(moved(walk.piece.held, a.state, guess).but(load=load))
     return rested(walk.piece, [a], found)

@@ -8,12 +8,13 @@ frames are too far from their state, Newton's method starts from the offset expe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from der.chords import chord
+from der.chords import between
 from der.equilibrium import Control, Direction, Equilibrium, dot, equilibrium, moved
 from der.frames import Array
 from der.rod import State
@@ -59,19 +60,25 @@ def restricted(
     q, load = fine.tangent.q, fine.tangent.load
     advance = dot(finest.body, _normal(finest, q, load), fine.tangent)
     q = np.ascontiguousarray(q[::2])
-    expected = None if near is None else near.half.offset
-    half = _level(on_half, fine.state, q, load, expected, advance, 0.0, tolerance)
+    given = None if near is None else near.half.offset
+    half = _level(on_half, fine.state, q, load, lambda: given, advance, 0.0, tolerance)
     if half is None:
         return None
+    expected = partial(_twice_as_coarse, on_quarter, half.offset, near)
+    q = np.ascontiguousarray(q[::2])
+    quarter = _level(on_quarter, half.at.state, q, load, expected, advance, half.beyond, tolerance)
+    return None if quarter is None else Restricted(half, quarter)
+
+
+def _twice_as_coarse(piece: Sector, finer: Direction, near: Restricted | None) -> Direction:
+    """The offset expected on the coarsest mesh, ``piece``, where ``finer`` is that before it."""
     # second order: four times that of the finer mesh; and what that was short of nearby
-    offset = _coarser(half.offset, 4.0)
+    offset = _coarser(finer, 4.0)
     if near is not None:
         less = _coarser(near.half.offset, 4.0)
         offset = _sum(_sum(offset, near.quarter.offset, 1.0), less, -1.0)
-    offset.q[~on_quarter.held.free] = 0.0
-    q = np.ascontiguousarray(q[::2])
-    quarter = _level(on_quarter, half.at.state, q, load, offset, advance, half.beyond, tolerance)
-    return None if quarter is None else Restricted(half, quarter)
+    offset.q[~piece.held.free] = 0.0
+    return offset
 
 
 def _level(
@@ -79,28 +86,24 @@ def _level(
     finer: State,
     q: Array,
     load: float,
-    expected: Direction | None,
+    expected: Callable[[], Direction | None],
     advance: float,
     beyond: float,
     tolerance: float,
 ) -> Level | None:
     """The state of ``piece`` in the plane normal to rates ``q`` (n, b) and ``load``.
 
-    Tried from bare frames, then from the offset ``expected``, which may lead beside the plane.
-    ``beyond`` is that of the finer mesh.
+    Tried from bare frames, then from the offset ``expected``, which may lead beside the plane and
+    is not worked out before it is needed. ``beyond`` is that of the finer mesh.
     """
-    own = finer.but(
-        quat=np.ascontiguousarray(finer.quat[::2]),
-        stretch=np.ascontiguousarray(finer.stretch[::2]),
+    own = State(
+        np.ascontiguousarray(finer.quat[::2]),
+        np.ascontiguousarray(finer.stretch[::2]),
+        finer.force,
+        finer.load,
     )
     row = _normal(piece, q, load)
-    starts = [own]
-    if expected is not None:
-        rates = Direction(q, np.zeros(len(own.force)), load)
-        # offsets of another state may lie beside this plane by a little
-        away = dot(piece.body, row, expected) / dot(piece.body, row, rates)
-        starts.append(moved(piece.held, own, _sum(expected, rates, -away)))
-    for start in starts:
+    for start in _starts(piece, own, row, load, expected):
         at = equilibrium(
             piece.body,
             piece.held,
@@ -113,15 +116,24 @@ def _level(
             break
     else:
         return None
-    offset = Direction(
-        chord(piece.held.free, own.quat, own.stretch, at.state.quat, at.state.stretch),
-        at.state.force - own.force,
-        at.state.load - own.load,
-    )
+    offset = between(piece.held, own, at.state)
     # corrections are orthogonal one by one, and rotations do not commute: a state lies beside the
     # plane to the second order of its offset, by as much as its start would have it
     beyond += dot(piece.body, row, offset) / advance
     return Level(at, offset, advance / speed, beyond)
+
+
+def _starts(
+    piece: Sector, own: State, row: Direction, load: float, expected: Callable[[], Direction | None]
+) -> Iterator[State]:
+    """Where Newton's method starts: bare frames, then these moved by the offset ``expected``."""
+    yield own
+    offset = expected()
+    if offset is not None:
+        rates = row._replace(load=load)
+        # offsets of another state may lie beside this plane by a little
+        away = dot(piece.body, row, offset) / dot(piece.body, row, rates)
+        yield moved(piece.held, own, _sum(offset, rates, -away))
 
 
 def _normal(piece: Sector, q: Array, load: float) -> Direction:
@@ -133,8 +145,7 @@ def _normal(piece: Sector, q: Array, load: float) -> Direction:
     both rotations, the grips' included: they turn with gamma and are no entries of q. Without them
     an end of the integral would be missing, and the series in h would have odd powers.
     """
-    grips = float(piece.body.mass[:, 0] @ piece.held.turn**2)
-    return Direction(q, np.zeros(len(piece.held.target)), grips * load)
+    return Direction(q, np.zeros(len(piece.held.target)), piece.turning * load)
 
 
 def _coarser(offset: Direction, factor: float) -> Direction:

@@ -12,7 +12,6 @@ mirrored, are thereby treated alike and the error of smooth rods has even powers
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -45,8 +44,7 @@ class Rod(NamedTuple):
         return 4 if self.stretching > 0.0 else 3
 
 
-@dataclass(frozen=True)
-class State:
+class State(NamedTuple):
     """One configuration of a rod; arrays are never written to after construction."""
 
     quat: Array  # (n, 4) material frame of each edge
@@ -56,7 +54,7 @@ class State:
 
     def but(self, **changes: object) -> State:
         """Copy with some entries replaced."""
-        return replace(self, **changes)  # type: ignore[arg-type]
+        return self._replace(**changes)  # type: ignore[arg-type]
 
 
 def rod(

@@ -55,6 +55,11 @@ class Sector:
         """The modes of all classes."""
         return stack([modes for _, modes in self.classes.values()])
 
+    @cached_property
+    def turning(self) -> float:
+        """Mass of the frames that turn with the load, times the square of how fast."""
+        return float(self.body.mass[:, 0] @ self.held.turn**2)
+
     def moment(self, generalised: float) -> float:
         """M of one arm, from dL/dgamma of the piece: M = (1/4) dU/dgamma of the full ring."""
         return 0.25 * self.copies * generalised
@@ -77,8 +82,12 @@ class Sector:
         Vertex j joins edges j and j + 1, edge 0 is the first grip's; the origin is midway between
         the grips.
         """
-        quat = self.full_frames(state)
-        return vertices(quat, self.full_lengths(state)), rotation(quat).swapaxes(1, 2)
+        return self.vertices(state), rotation(self.full_frames(state)).swapaxes(1, 2)
+
+    def vertices(self, state: State) -> Array:
+        """Vertices (N, 3) of the ring, as in `shape`."""
+        x: Array = vertices(self.full_frames(state), self.full_lengths(state))
+        return x
 
     def link(self, state: State) -> int:
         """Linking number of the ring."""

@@ -12,14 +12,14 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from der.branches import SAME, Change, Place, beside_folds, changes, is_fold, merged, own_changes
 from der.equilibrium import Equilibrium
+from der.frames import rotation_vector
 from der.passages import passage
-from der.rod import strains
 from der.sector import Sector
 from der.stability import indices_and_stiffness, stack
 from der.step import ROOT, Step
@@ -92,8 +92,7 @@ def full_index(piece: Sector, index: Indices | None) -> int | None:
     return total
 
 
-@dataclass(frozen=True)
-class _Mark:
+class _Mark(NamedTuple):
     """A visit and its place within a step."""
 
     s: float
@@ -272,9 +271,11 @@ def _between_loads(wanted: Wanted, low: float, high: float) -> Iterator[float]:
 
 def three_covered(piece: Sector, at: Equilibrium) -> bool:
     """Whether a state is the planar ring that covers itself three times, to 1e-6."""
-    x, _ = piece.shape(at.state)
-    kappa, _ = strains(piece.body, at.state)
-    turning = piece.copies * float(kappa[:, 0].sum())
+    x = piece.vertices(at.state)
+    quat = at.state.quat
+    # not the strains: some measures of curvature are no angles
+    angle = rotation_vector(quat, np.roll(quat, -1, axis=0))[: len(piece.body.cell), 0]
+    turning = piece.copies * float(angle.sum())
     return float(np.ptp(x[:, 0])) < 1e-6 and abs(turning - 6.0 * math.pi) < 1e-6
 
 
@@ -293,7 +294,7 @@ def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
 def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark]) -> list[_Mark]:
     """The line with branch points put in, the index of limits, and that beside folds."""
     line = [
-        replace(m, visit=visit(piece, wanted, m.visit.at, kind="limit"))
+        m._replace(visit=visit(piece, wanted, m.visit.at, kind="limit"))
         if m.visit.kind == "limit"
         else m
         for m in line
@@ -400,7 +401,7 @@ def _with_sides(piece: Sector, wanted: Wanted, step: Step, marks: list[_Mark]) -
             continue
         sides = _shared(places[0], group, before, after)
         for m, pair in zip(group, sides, strict=True):
-            sided[id(m)] = replace(m, visit=replace(m.visit, sides=pair))
+            sided[id(m)] = m._replace(visit=replace(m.visit, sides=pair))
     return [sided.get(id(m), m) for m in line]
 
 
@@ -435,8 +436,9 @@ def _passages(
     if ended and three_covered(piece, last.visit.at):
         return line  # the strands lie in each other: no link is defined
     if line[0].visit.link is None:
-        line[0] = replace(line[0], visit=replace(line[0].visit, link=piece.link(step.start.state)))
-    end = replace(last, visit=replace(last.visit, link=piece.link(last.visit.at.state)))
+        before = replace(line[0].visit, link=piece.link(step.start.state))
+        line[0] = line[0]._replace(visit=before)
+    end = last._replace(visit=replace(last.visit, link=piece.link(last.visit.at.state)))
     found = _contacts(piece, wanted, step, (line[0].s, line[0].visit.link), (end.s, end.visit.link))
     line = [*line[:-1], end]
     contacts = [_on_its_side(step, line, m) for m in _lasting(found)]
@@ -453,7 +455,7 @@ def _on_its_side(step: Step, line: list[_Mark], contact: _Mark) -> _Mark:
         if not m.visit.kind and abs(m.s - contact.s) < SAME * step.length:
             ahead = (load - m.visit.at.state.load) * rate
             if ahead * (contact.s - m.s) < 0.0:
-                contact = replace(contact, s=math.nextafter(m.s, math.copysign(math.inf, ahead)))
+                contact = contact._replace(s=math.nextafter(m.s, math.copysign(math.inf, ahead)))
     return contact
 
 

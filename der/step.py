@@ -14,9 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import numpy as np
-
-from der.chords import chord, end_rates, onward
+from der.chords import Curve, between, end_rates, onward
 from der.equilibrium import (
     ADVICE,
     Control,
@@ -27,17 +25,15 @@ from der.equilibrium import (
     equilibrium,
     moved,
 )
-from der.frames import Array, rotation_vector
 from der.rod import State
 from der.sector import Sector
 
 ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
 _ASTRAY = 0.2  # of a step: states that lie farther from its curve are on another branch
+_NEAR = 0.1  # of a step: the same for states at a given load
 _ELSEWHERE = 1e-6  # of s: no rounding leads so far, but a mode without stiffness does
 _LAST = 1e-9  # of s: a correction this small leaves the next one, its square, below `ROOT`
 _GAIN = 0.5  # of a value: a round that leaves more of it is one that Brent's method does better
-_APART = 0.1  # of a step: states that lie closer would tell more of rounding than of the path
-_MOST = 3  # states kept to interpolate between
 
 
 class Stuck(RuntimeError):
@@ -66,7 +62,6 @@ class Step:
     jump: Direction = field(init=False)  # from the start to the end
     end_rate: Direction = field(init=False)  # d jump/ds
     _found: dict[float, Equilibrium] = field(init=False, default_factory=dict)  # at these s
-    _off: list[tuple[float, Array]] = field(init=False, default_factory=list)  # u, off the cubic
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
@@ -78,71 +73,24 @@ class Step:
 
     def between(self, a: State, b: State) -> Direction:
         """The increment that leads from one state to another."""
-        q = chord(self.piece.held.free, a.quat, a.stretch, b.quat, b.stretch)
-        return Direction(q, b.force - a.force, b.load - a.load)
+        return between(self.piece.held, a, b)
 
     @cached_property
-    def _basis(self) -> Array:
-        """Rate at the start, jump and rate at the end, each flat: (3, n b + n_c + 1)."""
-        return np.array([_flat(d) for d in (self.start.tangent, self.jump, self.end_rate)])
-
-    def _hermite(self, s: float) -> tuple[float, float, float]:
-        """Weights of the rate at the start, the jump and the rate at the end at ``s``."""
-        u = s / self.length
-        return (
-            self.length * u * (1.0 - u) ** 2,
-            u * u * (3.0 - 2.0 * u),
-            self.length * u * u * (u - 1.0),
-        )
-
-    def offset(self, s: float) -> Direction:
-        """Increment from the start to ``s``: the cubic, and what is known to lie off it."""
-        away = np.array(self._hermite(s)) @ self._basis
-        for weight, off in self._weights(s):
-            away += weight * off
-        q = self.jump.q
-        return Direction(away[: q.size].reshape(q.shape), away[q.size : -1], float(away[-1]))
-
-    def _weights(self, s: float) -> list[tuple[float, Array]]:
-        """What lies off the cubic, by state, and its weights at ``s`` (Lagrange)."""
-        u = s / self.length
-        bump = (u * (1.0 - u)) ** 2
-        weights = []
-        for one, off in self._off:
-            weight = bump
-            for other, _ in self._off:
-                if other != one:
-                    weight *= (u - other) / (one - other)
-            weights.append((weight, off))
-        return weights
-
-    def _keep(self, s: float, state: State) -> None:
-        """Keep what an equilibrium at ``s`` lies off the cubic, where that says something new."""
-        u = s / self.length
-        places = (0.0, *(place for place, _ in self._off), 1.0)
-        if len(self._off) < _MOST and min(abs(u - place) for place in places) >= _APART:
-            off = _flat(self.between(self.start.state, state))
-            off -= np.array(self._hermite(s)) @ self._basis
-            self._off.append((u, off / (u * (1.0 - u)) ** 2))
+    def _curve(self) -> Curve:
+        """The curve from the start to the end, through the states that were found between them."""
+        return Curve(self.length, self.start.tangent, self.jump, self.end_rate)
 
     def expected(self, s: float) -> State:
         """The state at ``s`` as far as the curve tells, not corrected."""
-        return moved(self.piece.held, self.start.state, self.offset(s))
+        return moved(self.piece.held, self.start.state, self._curve.at(s))
 
     def beyond(self, s: float) -> Direction:
         """Increment from the end to ``s`` beyond it, measured along the tangent there.
 
         The cubic through both states and tangents, in the frames of the end.
         """
-        start, t, jump = self.start.tangent, self.end.tangent, self.jump
-        q, of_end, of_start, of_jump = onward(
-            self.piece.body.mass, s, jump.q, jump.load, start.q, start.load, t.q, t.load
-        )
-        return Direction(
-            q,
-            of_end * t.force + of_start * start.force + of_jump * jump.force,
-            of_end * t.load + of_start * start.load + of_jump * jump.load,
-        )
+        ways = (*self.jump, *self.start.tangent, *self.end.tangent)
+        return Direction(*onward(self.piece.body.mass, s, *ways))
 
     @property
     def bulge(self) -> float:
@@ -170,8 +118,12 @@ class Step:
             if dot(self.piece.body, away, away) > (_ASTRAY * self.length) ** 2:
                 raise self._stuck(expected, s, Outcome.DIVERGED)
             self._found[s] = found
-            self._keep(s, found.state)
+            self._keep(s, found)
         return self._found[s]
+
+    def _keep(self, s: float, found: Equilibrium) -> None:
+        """Lead the curve through a state at ``s``."""
+        self._curve.keep(s, self.between(self.start.state, found.state))
 
     def change(
         self,
@@ -218,52 +170,32 @@ class Step:
         """The equilibrium at ``load`` between s = low and high, where the load is monotonic."""
 
         def expected(s: float) -> float:
-            return self.start.state.load + self._load(s) - load
+            return self.start.state.load + self._curve.load(s) - load
 
         if expected(low) * expected(high) < 0.0:
             s = root(expected, low, high)
-            step = self.offset(s)
-            step = step._replace(load=load - self.start.state.load)
+            step = self._curve.at(s)._replace(load=load - self.start.state.load)
+            # the load given, not the one that differences give, to the last bit
+            guess = moved(self.piece.held, self.start.state, step).but(load=load)
             try:
-                guess = moved(self.piece.held, self.start.state, step)
                 found = self.polished(s, guess, Control.LOAD)
             except Stuck:
                 found = None
-            if found is not None and self._near(found, s):
-                # the load given, not the one that differences give, to the last bit
-                found = replace(found, state=found.state.but(load=load))
-                s = self._place(found, s, step)
-                self._keep(s, found.state)
-                return min(max(s, low), high), found
+            if found is not None and self._rises(s) * found.tangent.load > 0.0:
+                away = self.between(guess, found.state)
+                if dot(self.piece.body, away, away) < (_NEAR * self.length) ** 2:
+                    s += dot(self.piece.body, self.start.tangent, away)  # its own projection
+                    self._keep(s, found)
+                    return min(max(s, low), high), found
         # close to a fold: the load is a bad coordinate there, s is not
         ends = (low, self.at(low)), (high, self.at(high))
         s, found = self.change(lambda at: at.state.load - load, *ends)
         return s, replace(found, state=found.state.but(load=load))
 
-    def _place(self, found: Equilibrium, s: float, guess: Direction) -> float:
-        """The s of a state found near ``guess`` at ``s``: where its own projection lies."""
-        state = moved(self.piece.held, self.start.state, guess)
-        away = self.between(state, found.state)._replace(load=0.0)
-        return s + dot(self.piece.body, self.start.tangent, away)
-
-    def _near(self, found: Equilibrium, s: float) -> bool:
-        """Whether a state found at given load lies where the cubic expects it."""
-        q = rotation_vector(self.start.state.quat, found.state.quat)
-        q[~self.piece.held.free[:, :3]] = 0.0
-        away = float(np.sum(self.piece.body.mass * (q - self.offset(s).q[:, :3]) ** 2)) ** 0.5
-        return away < 0.1 * self.length and found.tangent.load * self._load_rate(s) > 0.0
-
-    def _load(self, s: float) -> float:
-        """The load of `offset`, less that of the start."""
-        of_start, of_jump, of_end = self._hermite(s)
-        start, end = self.start.tangent.load, self.end_rate.load
-        load = of_start * start + of_jump * self.jump.load + of_end * end
-        return load + sum(float(weight * off[-1]) for weight, off in self._weights(s))
-
-    def _load_rate(self, s: float) -> float:
-        """Its rate, to leading order."""
+    def _rises(self, s: float) -> float:
+        """By how much the load grows around ``s``, to leading order: the sign of its rate."""
         h = 1e-3 * self.length
-        return self._load(s + h) - self._load(s - h)
+        return self._curve.load(s + h) - self._curve.load(s - h)
 
     def as_is(self, s: float, state: State) -> Equilibrium:
         """A ``state`` at ``s`` as the equilibrium that it is to the tolerance, not moved.
@@ -319,11 +251,6 @@ class Step:
         return found
 
 
-def _flat(d: Direction) -> Array:
-    """A direction as one row."""
-    return np.concatenate([d.q.ravel(), d.force, [d.load]])
-
-
 def root(f: Callable[[float], float], low: float, high: float, within: float = ROOT) -> float:
     """Root of ``f`` between two places where its signs differ, to ``within``."""
     s = smooth_root(f, low, high, within)
@@ -366,11 +293,18 @@ def smooth_root(
         value = f(s)
         if value == 0.0 or (abs(s - last) < max(within, _LAST) and abs(value) <= least):
             return s  # a value that grows there is one beyond a jump
+        if abs(value) <= ROOT * min(_steepness(*known[:2]), _steepness(known[-1], (value, s))):
+            return s  # no nearer: rounding may make the next value grow
         sides[value > 0.0] = s
         if not abs(value) <= _GAIN * least:
             return None
         known.append((value, s))
         following, last, least = None, s, abs(value)
+
+
+def _steepness(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Of the chord through two values and their places; by two of them jumps are told apart."""
+    return abs((b[0] - a[0]) / (b[1] - a[1]))
 
 
 def _interpolated(known: list[tuple[float, float]]) -> float:

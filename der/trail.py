@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from der.chords import between
 from der.equilibrium import Direction, Equilibrium, Outcome, dot, moved
-from der.frames import rotation_vector
 from der.relaxation import Relaxed
 from der.rod import State
 from der.sector import Sector
@@ -48,19 +46,9 @@ def _per_load(at: Equilibrium) -> Direction:
     return Direction(at.tangent.q / at.tangent.load, 0.0 * at.tangent.force, 1.0)
 
 
-def change(piece: Sector, a: State, b: State) -> Direction:
-    """The increment that takes one state to another."""
-    q = np.zeros(piece.held.free.shape)
-    q[:, :3] = rotation_vector(a.quat, b.quat)
-    if piece.body.block == 4:
-        q[:, 3] = b.stretch - a.stretch
-    q[~piece.held.free] = 0.0
-    return Direction(q, b.force - a.force, b.load - a.load)
-
-
 def went_on(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> bool:
     """Whether a state lies where the last ones lead, and not where the ring has snapped to."""
-    miss = change(piece, ahead(piece, trail, found.state.load), found.state)
+    miss = between(piece.held, ahead(piece, trail, found.state.load), found.state)
     return math.sqrt(dot(piece.body, miss, miss)) < _MISS
 
 
@@ -90,7 +78,7 @@ def rested(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> Equilibri
     tangent, slope = heading(piece, 1.0), 0.0
     if trail:
         last = trail[-1]
-        step = change(piece, last.state, found.state)
+        step = between(piece.held, last.state, found.state)
         norm = math.sqrt(dot(piece.body, step, step))
         tangent, slope = last.tangent, last.slope  # where the two are one state
         apart = abs(step.load) > CLOSE

@@ -338,6 +338,15 @@ def test_other_natural_curvatures_reach_pi(natural_curvature):
     assert path.mode.foldable is (natural_curvature > 1.0)
 
 
+@pytest.mark.parametrize("curvature", ["logarithm", "angle", "tangent"])
+@pytest.mark.parametrize("sector", ["quarter", "full"])
+def test_the_folded_ring_is_known_by_any_measure_of_curvature(curvature, sector):
+    """It is covered three times where its frames turn by 6 pi; 2 tan(phi/2) are no angles."""
+    path = folded(curvature=curvature, sector=sector, contacts=False, until="folded")
+    assert path.gamma[-1] == math.pi
+    assert path.mode.foldable
+
+
 def test_finite_stretch_tends_to_none():
     """The difference is of order 1/EA = O((t/a)^2): ten times as slender, a hundredth of it."""
     rigid, soft, hard = (

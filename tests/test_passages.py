@@ -140,6 +140,23 @@ def test_root_of_a_smooth_function(guess):
     assert found == (None if guess == 3.0 else pytest.approx(0.7390851332151607, abs=1e-12))
 
 
+def test_root_of_a_function_with_rounding_is_found_as_soon_as_it_is_one():
+    """Errors of 1e-13 in the values cost no place more, whatever they are: they do not look rough.
+
+    Sixteen roundings of e^x = 2; the root is good to their size.
+    """
+    for seed in range(16):
+        asked, random = [], np.random.default_rng(seed)
+
+        def f(x, asked=asked, random=random):
+            asked.append(x)
+            return math.expm1(x) - 1.0 + 1e-13 * random.uniform(-1.0, 1.0)
+
+        found = smooth_root(f, 0.0, 1.0)
+        assert found == pytest.approx(math.log(2.0), abs=1e-12)
+        assert len(asked) <= 8
+
+
 @pytest.mark.parametrize(
     ("f", "at"),
     [

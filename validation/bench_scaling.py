@@ -85,5 +85,5 @@ def _bytes(ring: Sector) -> int:
     system = assemble(ring.body, held, state.quat, state.stretch, state.force, state.load)
     blocks = take_out(held.free, system.diag, system.off, system.border)
     factors = factor(*blocks)
-    arrays = [*state.__dict__.values(), *held, *ring.body, *system, *blocks, *factors]
+    arrays = [*state, *held, *ring.body, *system, *blocks, *factors]
     return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
