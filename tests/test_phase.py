@@ -185,16 +185,13 @@ def test_no_worker_is_left_behind(diagram):
     assert not multiprocessing.active_children()
 
 
-def test_figure_has_a_folder_of_its_own(tmp_path, monkeypatch):
+def test_figure_has_a_folder_of_its_own(diagram, tmp_path, monkeypatch):
     """Else the diagrams of `der figure all` would share their tables."""
     asked = []
 
     def note(name, folder, **options):
         asked.append((name, folder, options["resume"]))
-        return replace_files
-
-    class replace_files:  # noqa: N801
-        files = (tmp_path / "fig3a" / "fig3a.png",)
+        return replace(diagram, files=(tmp_path / "fig3a" / "fig3a.png",))
 
     monkeypatch.setattr("validation.phase.phase", note)
     drawn = draw(["fig3a"], tmp_path)
