@@ -10,7 +10,8 @@ from bvp import state_at, system, visits
 
 import der
 from validation.collocation import ADVICE, Collocation, Direction, Failure, Solution
-from validation.corrector import DIVERGED, SINGULAR, SLOW, _eliminate
+from validation.condensing import eliminate
+from validation.corrector import DIVERGED, SINGULAR, SLOW
 
 RINGS = {
     "quarter": (der.ellipse(0.6, "x"), 4.0, 1.9),
@@ -130,7 +131,7 @@ def test_elimination_solves_and_knows_the_sign_of_the_determinant(seed):
     matrix, right = random.normal(size=(16, 16)), random.normal(size=(16, 7))
     matrix[0, 0] = 0.0
     columns, expected = np.vstack([matrix.T, right.T]), np.linalg.solve(matrix, right)
-    assert _eliminate(columns) == np.sign(np.linalg.det(matrix))
+    assert eliminate(columns) == np.sign(np.linalg.det(matrix))
     rounding = 16 * np.finfo(float).eps * np.linalg.cond(matrix) * np.abs(expected).max()
     np.testing.assert_allclose(columns[16:].T, expected, rtol=0.0, atol=rounding)
 
@@ -139,7 +140,7 @@ def test_elimination_refuses_a_vanishing_pivot():
     """A row of zeros leaves no pivot in the last column but exactly zero."""
     matrix = np.random.default_rng(0).normal(size=(5, 5))
     matrix[2] = 0.0
-    assert _eliminate(np.vstack([matrix.T, np.ones((1, 5))])) == 0
+    assert eliminate(np.vstack([matrix.T, np.ones((1, 5))])) == 0
 
 
 # --- failure is a value -----------------------------------------------------------------------

@@ -19,7 +19,8 @@ import numpy as np
 from numba import njit
 
 from validation.collocation import Collocation
-from validation.corrector import _border, _forward, _move, workspace
+from validation.condensing import forward, workspace
+from validation.corrector import border, move
 from validation.gauss import Array
 from validation.meshes import Mesh
 
@@ -68,19 +69,17 @@ def _shoot(piece, h, rest, frames, p, gamma, iterations, tolerance):
     still = np.zeros(n_p + 1)
     ok = False
     for _ in range(iterations):
-        sign = _forward(
-            piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target
-        )
+        sign = forward(piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target)
         if sign == 0:
             break
-        size, _square = _move(h, z, still, still, frames, along)
+        size, _square = move(h, z, still, still, frames, along)
         if not size < 2.0:
             break
         if size < tolerance:
             ok = True
             break
     along[:] = 0.0
-    _border(h, along, 1.0, z, nodes[n], places[n], dq, dr, target, small)
+    border(h, along, 1.0, z, nodes[n], places[n], dq, dr, target, small)
     return ok, nodes, places, -small[n_p + 1, :n_p], small[: n_p + 1, :n_p].T.copy()
 
 

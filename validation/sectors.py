@@ -23,7 +23,7 @@ import numpy as np
 
 from der.ring import Ring
 from der.scene import Scene
-from validation.corrector import Piece
+from validation.condensing import Piece
 from validation.gauss import Array
 
 CLOSE = 1e-12  # of the ring's length: joints nearer to each other than this are one
