@@ -567,7 +567,7 @@ def bench(
 def stress(
     quick: Annotated[bool, typer.Option("--quick", help="120 cases, under a minute.")] = False,
     long: Annotated[
-        bool, typer.Option("--long", help="10,000 cases, 20 minutes on 2 cores.")
+        bool, typer.Option("--long", help="10,000 cases, ten minutes on 2 cores.")
     ] = False,
     workers: Annotated[
         int | None, typer.Option(parser=whole, help="Processes; with --long one a core, else one.")
