@@ -34,7 +34,7 @@ def draw(
 
     Parameters
     ----------
-    names : of FIGURES, and of DIAGRAMS, which take a minute each, those of cubes ten
+    names : of FIGURES, and of DIAGRAMS, which take half a minute each, those of cubes four minutes
     folder : where the files go; made if it is not there
     workers : how many figures at a time; None: as many as there are cores
     warn : told, in a line each, what the boundaries of a diagram leave open
