@@ -9,10 +9,10 @@ contact  the linking number changes: a strand passes through another
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,8 @@ from der.frames import rotation_vector
 from der.passages import passage
 from der.sector import Sector
 from der.stability import indices_and_stiffness, stack
-from der.step import ROOT, Step
+from der.step import Step
+from der.turns import Found, of_load, of_moment, turns
 
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 _CONTACT = 1e-5  # of s, for the passage of a strand: places are found to 2e-6
@@ -32,14 +33,9 @@ _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
 # of the softest torsion of a ring, GJ (2 pi/L)^2: within a step a mode's stiffness was seen to
 # bulge by 0.002 of it at the median and by 0.06 in one of a hundred
 _SOFT = 0.1
-_AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way
 _NEARLY = 0.25  # of the softer end: a parabola that comes so close to zero is looked at
-_ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
-_HALVED = 0.25  # of what it was wrong by: on a part of the interval
 
 Indices = tuple[int | None, ...]  # by symmetry class, multiplicities not yet applied
-Point: TypeAlias = tuple[float, Equilibrium]  # a place, and the state there
-Value: TypeAlias = Callable[[Equilibrium], tuple[float, float]]  # and its rate along the path
 
 
 @dataclass(frozen=True)
@@ -121,117 +117,14 @@ def special_points(
     return [m.visit for m in line[1:]], ended
 
 
-def _folds(step: Step) -> list[tuple[float, Equilibrium]]:
+def _folds(step: Step) -> list[Found]:
     """Folds of the load within a step, also a pair of them between tangents of equal sign."""
 
     def along(at: Equilibrium) -> tuple[float, float]:
-        load, rate = _load(at)
-        return load, step.end_rate.load if at is step.end else rate
+        value, rate = of_load(at)
+        return value, step.end_rate.load if at is step.end else rate
 
-    places = _looked_at(step, (0.0, step.start), (step.length, step.end), along)
-    return [
-        _turn(step, low, high, _load)
-        for low, high in pairwise(_cut(step, places, _load))
-        if low[1].tangent.load * high[1].tangent.load < 0.0
-    ]
-
-
-def _load(at: Equilibrium) -> tuple[float, float]:
-    """The load, and its rate along the path."""
-    return at.state.load, at.tangent.load
-
-
-def _moment(at: Equilibrium) -> tuple[float, float]:
-    """The moment, and its rate along the path."""
-    return at.moment, at.moment_rate
-
-
-def _turn(step: Step, low: Point, high: Point, value: Value) -> Point:
-    """The place between two, and its state, where a ``value`` turns: its rate changes sign."""
-    (s, a), (t, b) = low, high
-    (first, rate), (last, other) = value(a), value(b)
-    c1, c2, c3 = _cubic(t - s, last - first, rate, other)
-    # the root of c1 + 2 c2 u + 3 c3 u^2 between 0 and 1, where that changes its sign
-    u = -c1 / (c2 + math.copysign(math.sqrt(max(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
-    if not 0.0 < u < 1.0 and c3 != 0.0 and u != 0.0:
-        u = c1 / (3.0 * c3 * u)
-    guess = s + u * (t - s) if 0.0 < u < 1.0 else None
-    return step.change(lambda at: value(at)[1], low, high, guess)
-
-
-def _cubic(length: float, jump: float, first: float, last: float) -> tuple[float, float, float]:
-    """Coefficients of u, u^2, u^3 of the cubic by its rates at u = 0 and 1, over its ``length``."""
-    mean = jump / length
-    return first, 3.0 * mean - 2.0 * first - last, first + last - 2.0 * mean
-
-
-def _looked_at(
-    step: Step, low: Point, high: Point, value: Value, off: float | None = None
-) -> list[Point]:
-    """Two places, and those between that tell whether the rate of a value changes sign there.
-
-    Two turns that lie close together show at the ends of an interval only by the cubic between
-    them, whose rate is smallest in the middle. Where that says that they may be there, this place
-    is looked at, and the two halves again.
-
-    Parameters
-    ----------
-    off : by how much the rate of the cubic may be wrong; None: not known.
-    """
-    (s, a), (t, b) = low, high
-    (first, rate), (last, other) = value(a), value(b)
-    if rate * other <= 0.0 or t - s < SAME * step.length:
-        return [low, high]
-    _, c2, c3 = _cubic(t - s, last - first, rate, other)
-    u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
-    if not 0.0 < u < 1.0:
-        return [low, high]
-    expected = rate + (2.0 * c2 + 3.0 * c3 * u) * u
-    off = _ASLANT * abs(rate) if off is None else off
-    if math.copysign(1.0, rate) * expected >= off:
-        return [low, high]
-    place = s + u * (t - s)
-    middle = (place, step.at(place))
-    found = value(middle[1])[1]
-    if found * rate < 0.0:
-        return [low, middle, high]
-    # of third order in the length
-    off = _HALVED * abs(found - expected)
-    before = _looked_at(step, low, middle, value, off)
-    return [*before, *_looked_at(step, middle, high, value, off)[1:]]
-
-
-def _cut(
-    step: Step,
-    places: list[Point],
-    value: Value,
-) -> list[Point]:
-    """Places with one more wherever a value changes against its rates at two of them.
-
-    In between the rate has the other sign, on however short a way: by bisection. Where a ring is
-    stretched all but taut, M so leaps from one end of its range to the other.
-    """
-    cut = places[:1]
-    for low, high in pairwise(places):
-        end = high
-        while high[0] - low[0] > ROOT:
-            (first, rate), (last, other) = value(low[1]), value(high[1])
-            least = _AGAINST * max(abs(rate), abs(other)) * (high[0] - low[0])
-            if rate * other <= 0.0 or (last - first) * math.copysign(1.0, rate) >= -least:
-                break
-            s = 0.5 * (low[0] + high[0])
-            middle = (s, step.at(s))
-            between, turned = value(middle[1])
-            if turned * rate < 0.0:
-                cut.append(middle)
-                break
-            # it is against its rates on one of the halves at least
-            if (between - first) * rate < 0.0:
-                high = middle
-            else:
-                low = middle
-        cut.append(end)
-    return cut
+    return turns(step, (0.0, step.start), (step.length, step.end), of_load, along)
 
 
 def _at_targets(
@@ -281,14 +174,11 @@ def three_covered(piece: Sector, at: Equilibrium) -> bool:
 
 def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
     """Limits of the moment between the marks of a line."""
-    found = []
-    for a, b in pairwise(line):
-        places = _looked_at(step, (a.s, a.visit.at), (b.s, b.visit.at), _moment)
-        for low, high in pairwise(_cut(step, places, _moment)):
-            if low[1].moment_rate * high[1].moment_rate < 0.0:
-                s, at = _turn(step, low, high, _moment)
-                found.append(_Mark(s, Visit(at, "limit")))
-    return found
+    return [
+        _Mark(s, Visit(at, "limit"))
+        for a, b in pairwise(line)
+        for s, at in turns(step, (a.s, a.visit.at), (b.s, b.visit.at), of_moment)
+    ]
 
 
 def _index_changes(piece: Sector, wanted: Wanted, step: Step, line: list[_Mark]) -> list[_Mark]:
@@ -450,7 +340,7 @@ def _on_its_side(step: Step, line: list[_Mark], contact: _Mark) -> _Mark:
 
     The place of a state at a given load is known to second order only.
     """
-    load, rate = _load(contact.visit.at)
+    load, rate = of_load(contact.visit.at)
     for m in line[1:-1]:  # the ends of the step stay its ends
         if not m.visit.kind and abs(m.s - contact.s) < SAME * step.length:
             ahead = (load - m.visit.at.state.load) * rate

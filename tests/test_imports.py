@@ -51,6 +51,7 @@ ROOMS = {
         "step",
         "passages",
         "branches",
+        "turns",
         "special",
         "path",
         "forces",

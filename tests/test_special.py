@@ -16,7 +16,6 @@ from der.special import (
     Visit,
     Wanted,
     _closest,
-    _cut,
     _Mark,
     _on_its_side,
     special_points,
@@ -24,6 +23,7 @@ from der.special import (
 )
 from der.stability import index, indices_and_stiffness, raw_index, softest_modes, stack
 from der.step import Step, Tally
+from der.turns import _cut
 
 # h/t = 2.5075: beyond the first fold one out-of-phase mode is unstable for 6e-5 rad of gamma
 NEARLY = der.triangle(math.radians(60), 0.0866)
