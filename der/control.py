@@ -30,7 +30,7 @@ from der.equilibrium import (
 from der.path import FIRST_STEP, LARGEST_STEP, SMALLEST_STEP
 from der.sector import Sector
 from der.snap import downhill, heading, snap
-from der.special import Visit, Wanted, special_points, three_covered, visit
+from der.special import Visit, Wanted, special_points, touches_itself, visit
 from der.stability import all_modes
 from der.step import Step, Stuck, Tally
 
@@ -244,8 +244,8 @@ def _next_length(step: Step) -> float:
 
 def _found(piece: Sector, wanted: Wanted, step: Step, here: Visit) -> tuple[list[Visit], bool]:
     """Visits of one step; a loss of stability in the sector's own class is among them always."""
-    if wanted.contacts and three_covered(piece, here.at):
-        wanted = replace(wanted, contacts=False)  # strands lie in each other: no link to start from
+    if wanted.contacts and touches_itself(piece, here.at):
+        wanted = replace(wanted, contacts=False)  # no link to start from
     found, ended = special_points(piece, wanted, step, here)
     folds = any(one.kind == "fold" for one in found)
     if wanted.stability or folds or _own_index(piece, step.end) == 0:

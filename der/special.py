@@ -162,14 +162,25 @@ def _between_loads(wanted: Wanted, low: float, high: float) -> Iterator[float]:
             yield load
 
 
-def three_covered(piece: Sector, at: Equilibrium) -> bool:
-    """Whether a state is the planar ring that covers itself three times, to 1e-6."""
+def covering(piece: Sector, at: Equilibrium) -> int | None:
+    """How often the tangent of a planar state turns, to 1e-6, < 0 inside out; None: not planar."""
     x = piece.vertices(at.state)
     quat = at.state.quat
     # not the strains: some measures of curvature are no angles
     angle = rotation_vector(quat, np.roll(quat, -1, axis=0))[: len(piece.body.cell), 0]
-    turning = piece.copies * float(angle.sum())
-    return float(np.ptp(x[:, 0])) < 1e-6 and abs(turning - 6.0 * math.pi) < 1e-6
+    count = piece.copies * float(angle.sum()) / (2.0 * math.pi)
+    planar = float(np.ptp(x[:, 0])) < 1e-6 and abs(count - round(count)) < 1e-6
+    return round(count) if planar else None
+
+
+def three_covered(piece: Sector, at: Equilibrium) -> bool:
+    """Whether a state is the planar ring that covers itself three times."""
+    return covering(piece, at) == 3
+
+
+def touches_itself(piece: Sector, at: Equilibrium) -> bool:
+    """Whether a state is planar and crosses or covers itself: then no link is defined."""
+    return covering(piece, at) not in (None, 1, -1)
 
 
 def _limits(step: Step, line: list[_Mark]) -> list[_Mark]:
@@ -323,8 +334,8 @@ def _passages(
 ) -> list[_Mark]:
     """The line with the link of its ends filled in and contacts put where it changes."""
     last = line[-1]
-    if ended and three_covered(piece, last.visit.at):
-        return line  # the strands lie in each other: no link is defined
+    if ended and touches_itself(piece, last.visit.at):
+        return line
     if line[0].visit.link is None:
         before = replace(line[0].visit, link=piece.link(step.start.state))
         line[0] = line[0]._replace(visit=before)

@@ -88,6 +88,23 @@ def test_bisection_finds_the_same_contacts(monkeypatch):
     assert [one.at.state.load for one in bisected] == pytest.approx(gammas, abs=1e-5)
 
 
+def test_no_contact_is_made_up_where_a_ring_ends_in_its_plane():
+    """A stadium that turns back ends inside out, covering itself five times: Lk is not defined.
+
+    What rounding makes of Tw + Wr there showed as a contact 1e-6 rad before the end.
+    """
+    section = der.rectangular_section(3.006756668718511, nu=0.0)
+    ring = der.rectangle(0.4824982358095524, 0.3494169915718395, twist_axis="y")
+    piece = sector(ring, section, 64)
+    *_, before, last = follow(piece, Wanted(stability=False, targets=(-3.1,)), Tally())
+    assert last.at.state.load == -math.pi
+    assert der.special.covering(piece, last.at) == -5
+    assert der.special.touches_itself(piece, last.at)
+    assert before.kind != "contact"
+    assert der.special.covering(piece, before.at) is None
+    assert not der.special.touches_itself(piece, before.at)
+
+
 def test_a_wrong_passage_does_no_harm(monkeypatch):
     """What is no passage splits the step like any other place."""
     _, found = contacts()
