@@ -151,7 +151,7 @@ def _with_error_bars(
     end = _end(coarse[-1], replace(wanted, most_steps=4 * len(visits) + 100))
     if end != visits[-1].at.state.load:
         return _without_errors(entries(), scene.n_edges // 4, end)
-    asked = {math.pi, scene.gamma_max}
+    asked = {math.pi, scene.gamma_max, -scene.gamma_max}
     if scene.save_at is not None:
         asked |= set(scene.save_at)
     else:

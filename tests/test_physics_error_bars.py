@@ -275,6 +275,16 @@ def test_meshes_of_two_kinds_give_no_errors(n_edges, arrives):
     assert ("40 edges the path ends" in path.error["how"]) == arrives
 
 
+def test_a_path_that_turns_back_for_good_ends_at_minus_pi_by_any_number_of_edges():
+    """Also where other gammas were asked for: its end is, always, and there gamma has no error."""
+    ring, section = der.rectangle(0.64, 0.64, "y"), der.rectangular_section(44.3, nu=0.01)
+    scene = der.Scene(ring, section, n_edges=96, error_bars=True, stability=False, save_at=(1.0,))
+    path = der.fold(scene)
+    assert path.gamma[-1] == -math.pi
+    assert path.error["gamma"][-1] == 0.0
+    assert 0.0 < path.error["moment"][-1] < 0.02 * abs(path.moment).max()
+
+
 @pytest.mark.parametrize(
     ("ring", "h_over_t", "nu", "gamma", "count"),
     [
