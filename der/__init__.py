@@ -10,21 +10,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from der.folding import fold
-    from der.landscape_push import least_push
-    from der.planar_record import PlanarState, PlanarStates, Squeeze, SqueezePoint
-    from der.planar_squeeze import squeeze
-    from der.planar_states import planar
-    from der.record import Path, Point
-    from der.ring import Ring, circle, ellipse, profile, rectangle, triangle
+    from der.analysis.compare import Comparison, compare
+    from der.analysis.fold import fold
+    from der.analysis.landscape.barrier import free_barrier as barrier
+    from der.analysis.landscape.landscape import landscape
+    from der.analysis.landscape.opening import least_push
+    from der.analysis.landscape.surface import surface as energy_surface
+    from der.analysis.multistability.states import states
+    from der.analysis.planar.planar_states import planar
+    from der.analysis.planar.squeeze import squeeze
+    from der.bvp.packing import packing_ratio
+    from der.bvp.solve import solve as solve_bvp
+    from der.diagram.diagram import phase as phase_diagram
+    from der.geometry.ring import Ring, circle, ellipse, profile, rectangle, triangle
+    from der.geometry.section import Scale, Section, rectangular_section, section
+    from der.records.configurations import Shapes
+    from der.records.path import Path, Point
+    from der.records.planar import PlanarState, PlanarStates, Squeeze, SqueezePoint
+    from der.records.states import RingState, States, Transition
     from der.scene import Scene
-    from der.sections import Scale, Section, rectangular_section, section
-    from der.shapes import Shapes
-    from der.states_record import RingState, States, Transition
-    from der.states_search import states
-    from der.unfinished import Interrupted, NotConverged
+    from der.utils.interrupts import Interrupted, NotConverged
 
 __all__ = [
+    "Comparison",
     "Interrupted",
     "NotConverged",
     "Path",
@@ -41,44 +49,79 @@ __all__ = [
     "SqueezePoint",
     "States",
     "Transition",
+    "__version__",
+    "barrier",
     "circle",
+    "compare",
     "ellipse",
+    "energy_surface",
     "fold",
+    "landscape",
     "least_push",
+    "packing_ratio",
+    "phase_diagram",
     "planar",
     "profile",
     "rectangle",
     "rectangular_section",
     "section",
+    "solve_bvp",
     "squeeze",
     "states",
     "triangle",
 ]
 
+# where each public name lives
 _HOME = {
-    "folding": ("fold",),
-    "landscape_push": ("least_push",),
-    "planar_record": ("PlanarState", "PlanarStates", "Squeeze", "SqueezePoint"),
-    "planar_squeeze": ("squeeze",),
-    "planar_states": ("planar",),
-    "record": ("Path", "Point"),
-    "ring": ("Ring", "circle", "ellipse", "profile", "rectangle", "triangle"),
-    "scene": ("Scene",),
-    "sections": ("Scale", "Section", "rectangular_section", "section"),
-    "shapes": ("Shapes",),
-    "states_record": ("RingState", "States", "Transition"),
-    "states_search": ("states",),
-    "unfinished": ("Interrupted", "NotConverged"),
+    "Comparison": ("der.analysis.compare", "Comparison"),
+    "compare": ("der.analysis.compare", "compare"),
+    "fold": ("der.analysis.fold", "fold"),
+    "barrier": ("der.analysis.landscape.barrier", "free_barrier"),
+    "landscape": ("der.analysis.landscape.landscape", "landscape"),
+    "least_push": ("der.analysis.landscape.opening", "least_push"),
+    "energy_surface": ("der.analysis.landscape.surface", "surface"),
+    "states": ("der.analysis.multistability.states", "states"),
+    "planar": ("der.analysis.planar.planar_states", "planar"),
+    "squeeze": ("der.analysis.planar.squeeze", "squeeze"),
+    "packing_ratio": ("der.bvp.packing", "packing_ratio"),
+    "solve_bvp": ("der.bvp.solve", "solve"),
+    "phase_diagram": ("der.diagram.diagram", "phase"),
+    "Ring": ("der.geometry.ring", "Ring"),
+    "circle": ("der.geometry.ring", "circle"),
+    "ellipse": ("der.geometry.ring", "ellipse"),
+    "profile": ("der.geometry.ring", "profile"),
+    "rectangle": ("der.geometry.ring", "rectangle"),
+    "triangle": ("der.geometry.ring", "triangle"),
+    "Scale": ("der.geometry.section", "Scale"),
+    "Section": ("der.geometry.section", "Section"),
+    "rectangular_section": ("der.geometry.section", "rectangular_section"),
+    "section": ("der.geometry.section", "section"),
+    "Shapes": ("der.records.configurations", "Shapes"),
+    "Path": ("der.records.path", "Path"),
+    "Point": ("der.records.path", "Point"),
+    "PlanarState": ("der.records.planar", "PlanarState"),
+    "PlanarStates": ("der.records.planar", "PlanarStates"),
+    "Squeeze": ("der.records.planar", "Squeeze"),
+    "SqueezePoint": ("der.records.planar", "SqueezePoint"),
+    "RingState": ("der.records.states", "RingState"),
+    "States": ("der.records.states", "States"),
+    "Transition": ("der.records.states", "Transition"),
+    "Scene": ("der.scene", "Scene"),
+    "Interrupted": ("der.utils.interrupts", "Interrupted"),
+    "NotConverged": ("der.utils.interrupts", "NotConverged"),
 }
 
 
 def __getattr__(name: str) -> Any:
-    for module, names in _HOME.items():
-        if name in names:
-            value = getattr(import_module(f"der.{module}"), name)
-            globals()[name] = value
-            return value
-    raise AttributeError(f"module 'der' has no attribute {name!r}")
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("ring-origami")
+    if name not in _HOME:
+        raise AttributeError(f"module 'der' has no attribute {name!r}")
+    module, public = _HOME[name]
+    value = globals()[name] = getattr(import_module(module), public)
+    return value
 
 
 def __dir__() -> list[str]:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from numbers import Integral
 
-from der.checks import checked_number, one_of, positive, shown, truth
-from der.ring import Ring
-from der.sections import Section
+from der.geometry.ring import Ring
+from der.geometry.section import Section
+from der.utils.checks import checked_number, one_of, positive, shown, truth
 
 MEASURES = ("logarithm", "angle", "tangent")  # of curvature, see strain.py
 CONTROLS = ("arclength", "angle", "moment")

@@ -2,7 +2,7 @@
 
 The ring has one mirror axis, so that half of it is solved. gamma turns back from 0.39 pi to 0.13 pi
 before the corners tuck in and the ring folds, stably (paper, Fig. 11b). A third of the edges sit on
-the fillets, which are a tenth of the length: where the ring is bent, `der.sites` puts frames close.
+the fillets, which are a tenth of the length: where the ring is bent, the mesh puts frames close.
 
     python -m scenarios.fold_triangle [DIR]
 

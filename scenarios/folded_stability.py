@@ -22,15 +22,15 @@ from pathlib import Path as File
 import numpy as np
 
 import der
-from der.assembly import assemble
-from der.equilibrium import Equilibrium, equilibrium
-from der.path import follow
-from der.ring import Ring
-from der.rod import State
-from der.sector import Sector, free_ring, sector
-from der.special import Wanted, three_covered
-from der.stability import all_modes, index, softest_modes
-from der.step import Tally
+from der.continuation.arclength import follow
+from der.continuation.events import Wanted, three_covered
+from der.continuation.step import Tally
+from der.geometry.ring import Ring
+from der.kernels.assembly import assemble
+from der.rod.equilibrium import Equilibrium, equilibrium
+from der.rod.gripped_ring import Sector, free_ring, sector
+from der.rod.rod import State
+from der.rod.stability import all_modes, index, softest_modes
 from validation.arguments import Arguments
 
 EDGES = 128

@@ -24,7 +24,7 @@ from pathlib import Path as File
 import numpy as np
 
 import der
-from der.files import write_whole
+from der.utils.files import write_whole
 from scenarios.output import folder, usage, write
 from scenarios.snapping_rings import SNAPPING
 

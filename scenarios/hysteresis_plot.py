@@ -11,9 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from der.curve import smooth
-from der.files import FilePath, write_whole
-from der.record import Path
+from der.records.path import Path
+from der.utils.files import FilePath, write_whole
+from der.viz.curve import smooth
 
 if TYPE_CHECKING:
     from scenarios.hysteresis import Loop

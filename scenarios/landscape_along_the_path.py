@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.landscape_curve import landscape
-from der.landscape_over import barriers_over
+from der.analysis.landscape.landscape import landscape
+from der.analysis.landscape.over_thickness import barriers_over
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
@@ -35,8 +35,8 @@ beside = barriers_over(der.circle(), BESIDE, n_edges=128)
 threshold = float(np.polyval(np.polyfit(np.sqrt(beside.open), BESIDE, 3), 0.0))
 
 if __name__ == "__main__":
-    from der.view_landscape import figure_of_barriers, figure_of_landscape
-    from der.view_style import save_figure
+    from der.viz.plots.landscape import figure_of_barriers, figure_of_landscape
+    from der.viz.plots.style import save_figure
 
     place = folder("landscape_along_the_path")
     one.save(place / "landscape.json")

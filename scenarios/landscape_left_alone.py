@@ -16,9 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.landscape_curve import landscape
-from der.landscape_free import free_barrier
-from der.landscape_over import barriers_over
+from der.analysis.landscape.barrier import free_barrier
+from der.analysis.landscape.landscape import landscape
+from der.analysis.landscape.over_thickness import barriers_over
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
@@ -32,8 +32,8 @@ twisted = landscape(scene)
 found = free_barrier(scene)
 
 if __name__ == "__main__":
-    from der.view_landscape import figure_of_barriers, figure_of_pass
-    from der.view_style import save_figure
+    from der.viz.plots.landscape import figure_of_barriers, figure_of_pass
+    from der.viz.plots.style import save_figure
 
     place = folder("landscape_left_alone")
     found.save(place / "pass.json")

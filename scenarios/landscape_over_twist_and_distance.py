@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.landscape_surface import surface
+from der.analysis.landscape.surface import surface
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
@@ -36,8 +36,8 @@ before = [n for gamma, n in zip(sheet.gamma, rows, strict=True) if gamma < secon
 least = [float(sheet.energy[:, j].min()) for j in range(len(sheet.distance))]
 
 if __name__ == "__main__":
-    from der.view_style import save_figure
-    from der.view_surface import figure_of_surface
+    from der.viz.plots.energy_surface import figure_of_surface
+    from der.viz.plots.style import save_figure
 
     place = folder("landscape_over_twist_and_distance")
     sheet.save(place / "surface.json")

@@ -18,10 +18,10 @@ from __future__ import annotations
 import math
 
 import der
-from der.landscape_free import ALIKE, twisted_rests
-from der.landscape_march import march
-from der.landscape_push import least_push
-from der.landscape_tools import struts
+from der.analysis.landscape.actuators import struts
+from der.analysis.landscape.barrier import ALIKE, twisted_rests
+from der.analysis.landscape.opening import least_push
+from der.analysis.landscape.opening_path import march
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
@@ -35,8 +35,8 @@ lift = struts(alone[-1], (0, N_EDGES // 3))[0]
 lifted = march(lift, rests[-1].energy, ALIKE * rests[-1].energy)
 
 if __name__ == "__main__":
-    from der.view_push import figure_of_push
-    from der.view_style import save_figure
+    from der.viz.plots.opening import figure_of_push
+    from der.viz.plots.style import save_figure
 
     place = folder("landscape_push")
     for ring, n_edges in ((der.circle(), 96), (der.ellipse(b_over_a=0.6), 128)):

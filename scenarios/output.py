@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path as File
 
-from der.record import Path
-from der.summary import summary
+from der.records.path import Path
+from der.records.text import summary
 from validation.arguments import Arguments
 
 
@@ -35,8 +35,8 @@ def write(path: Path, name: str, *, stem: str = "path") -> None:
 
     They go to the `folder` of the scenario; the shapes are STEM.npz where STEM is not "path".
     """
-    from der.view_plots import save_plot
-    from der.view_rerun import save_recording
+    from der.viz.plots.path import save_plot
+    from der.viz.rerun.recording import save_recording
 
     place = folder(name)
     path.save(place / f"{stem}.json")

@@ -1,6 +1,6 @@
 """Fold 500 rings at random in every way there is, and list the stops that nobody has explained.
 
-Rings and sections of the ranges of the paper's phase diagrams (`validation.random_rings`) are
+Rings and sections of the ranges of the paper's phase diagrams are
 followed by the arc length, turned up and down by the angle, and loaded by a dead moment. A stop
 that says what the ring does, where it breaks a symmetry that the sector keeps or its path leads
 back beyond -pi, is an answer; any other is a defect of the solver. Followed paths are held against
@@ -24,11 +24,11 @@ from pathlib import Path as File
 import numpy as np
 
 import der
-from der.record import Path
-from der.ring import Ring
-from der.sections import Section
+from der.geometry.ring import Ring
+from der.geometry.section import Section
+from der.records.path import Path
 from validation.arguments import Arguments
-from validation.random_rings import LOOSE, random_rings, work_missing
+from validation.stress.random_rings import LOOSE, random_rings, work_missing
 
 WAYS: dict[str, dict[str, object]] = {
     "arclength": {"control": "arclength"},

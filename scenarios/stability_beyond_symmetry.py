@@ -26,8 +26,8 @@ from pathlib import Path as File
 import numpy as np
 
 import der
-from der.record import NO_MOMENT, Path
-from der.ring import Ring
+from der.geometry.ring import Ring
+from der.records.path import NO_MOMENT, Path
 from scenarios.folded_stability import LARGEST_CIRCLE
 from validation.arguments import Arguments
 
@@ -233,7 +233,7 @@ def write(verdicts: list[Verdict], folder: File) -> None:
 
 def draw(verdicts: list[Verdict], file: File) -> None:
     """One panel for each family, profile against h/t; open marks are a, b and d."""
-    from validation.figures.canvas import page, save
+    from der.paper.canvas import page, save
 
     families = list(dict.fromkeys(verdict.family for verdict in verdicts))
     columns = min(4, len(families))

@@ -24,9 +24,9 @@ from itertools import pairwise
 import numpy as np
 
 import der
-from der.sector import sector
-from der.stability import all_modes, raw_index
-from der.states_starts import covered
+from der.analysis.multistability.initial_guesses import covered
+from der.rod.gripped_ring import sector
+from der.rod.stability import all_modes, raw_index
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
@@ -107,8 +107,8 @@ on_mesh = {
 
 def main() -> None:
     """Search over the natural curvature, draw, and say how far the thresholds are off."""
-    from der.view_states import figure_of_states
-    from der.view_style import save_figure
+    from der.viz.plots.states import figure_of_states
+    from der.viz.plots.style import save_figure
     from scenarios.states_plot import figure_over_curvature
 
     place = folder("states_of_natural_curvature")

@@ -27,17 +27,17 @@ from dataclasses import dataclass
 import numpy as np
 
 import der
-from der.control import follow_angle, follow_moment
-from der.equilibrium import Control, Direction, Equilibrium, equilibrium
-from der.falls import Fallen
-from der.frames import rotation_vector
-from der.gradient_flow import flow
-from der.motion import move
-from der.relaxation import Relaxed, Rest, relax
-from der.sector import Sector, sector
-from der.snap import KICK, Landing
-from der.special import Wanted, visit
-from der.step import Tally
+from der.analysis.loading import follow_angle, follow_moment
+from der.analysis.snap import KICK, Landing
+from der.continuation.events import Wanted, visit
+from der.continuation.step import Tally
+from der.kernels.quaternions import rotation_vector
+from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium
+from der.rod.falls import Fallen
+from der.rod.gradient_flow import flow
+from der.rod.gripped_ring import Sector, sector
+from der.rod.motion import move
+from der.rod.relaxation import Relaxed, Rest, relax
 from scenarios.output import folder, usage
 from scenarios.snapping_rings import SNAPPING
 

@@ -5,8 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from der.assembly import assemble
-from der.equilibrium import (
+from der.kernels.assembly import assemble
+from der.kernels.linking import unfold
+from der.kernels.quaternions import Array, rotation, turned
+from der.rod.equilibrium import (
     ADVICE,
     Control,
     Direction,
@@ -14,12 +16,10 @@ from der.equilibrium import (
     equilibrium,
     moved,
 )
-from der.frames import Array, rotation, turned
-from der.linking import unfold
-from der.rod import Rod, State, rod
-from der.sector import Sector
-from der.stability import all_modes, raw_index
-from der.supports import Supports
+from der.rod.gripped_ring import Sector
+from der.rod.rod import Rod, State, rod
+from der.rod.stability import all_modes, raw_index
+from der.rod.supports import Supports
 
 E1, E2, E3 = np.eye(3)
 MEASURES = ("logarithm", "angle", "tangent")

@@ -18,12 +18,12 @@ from hypothesis import strategies as st
 
 import der
 import validation
-from der.cli import main
-from der.profile_files import read_profile
-from der.record import Path
+from der.cli.commands import main
+from der.geometry.profile_csv import read_profile
+from der.records.configurations import Shapes
+from der.records.path import Path
 from der.scene import MEASURES
-from der.shapes import Shapes
-from validation.stress_inputs import arguments, refusal
+from validation.stress.inputs import arguments, refusal
 
 EXAMPLES = {"quick": 200, "path": 25, "command": 60}
 FILES = [HealthCheck.function_scoped_fixture]

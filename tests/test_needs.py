@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 
 import der
-from der.assembly import assemble
-from der.planar_ring import covered, planar_ring
-from der.planar_rod import assemble_planar
-from der.relaxation import relax
-from der.sector import sector
-from validation.bench_rows import peak_memory
+from der.kernels.assembly import assemble
+from der.kernels.planar import assemble_planar
+from der.rod.gripped_ring import sector
+from der.rod.planar_ring import covered, planar_ring
+from der.rod.relaxation import relax
+from validation.benchmark.rows import peak_memory
 
 BARE = {"n_edges": 32, "stability": False, "contacts": False, "gamma_max": 0.6}
 
 # what may be asked for -> who does it, in the module that calls it
 DOERS = {
-    "stability": ({"stability": True}, "der.special.indices_and_stiffness"),
-    "contacts": ({"contacts": True}, "der.sector.link"),
-    "error bars": ({"error_bars": True}, "der.error_bars.error_bars"),
-    "shapes": ({"shapes": True}, "der.unfolding.shapes"),
-    "modes": ({"shapes": True, "modes": True}, "der.unfolding.softest_modes"),
-    "relaxation": ({"control": "angle", "solver": "relaxation"}, "der.relaxation._relax"),
+    "stability": ({"stability": True}, "der.continuation.events.indices_and_stiffness"),
+    "contacts": ({"contacts": True}, "der.rod.gripped_ring.link"),
+    "error bars": ({"error_bars": True}, "der.analysis.error_bars.error_bars"),
+    "shapes": ({"shapes": True}, "der.analysis.full_ring.shapes"),
+    "modes": ({"shapes": True, "modes": True}, "der.analysis.full_ring.softest_modes"),
+    "relaxation": ({"control": "angle", "solver": "relaxation"}, "der.rod.relaxation._relax"),
 }
 
 
@@ -118,15 +118,15 @@ def test_stretch_takes_unknowns_only_where_it_is_finite(stretching, block):
 
 
 OPTIONAL = (
-    "der.error_bars",
-    "der.matching",
-    "der.control",
-    "der.snap",
-    "der.relaxation",
-    "der.relaxed_march",
-    "der.unfolding",
-    "der.view_rerun",
-    "der.view_plots",
+    "der.analysis.error_bars",
+    "der.analysis.matching",
+    "der.analysis.loading",
+    "der.analysis.snap",
+    "der.rod.relaxation",
+    "der.analysis.loading_by_relaxation",
+    "der.analysis.full_ring",
+    "der.viz.rerun.recording",
+    "der.viz.plots.path",
     "validation",
     "matplotlib",
     "rerun",
@@ -136,8 +136,12 @@ OPTIONAL = (
 )
 NEEDED = {
     "": set(),
-    "error_bars=True, shapes=True": {"der.error_bars", "der.matching", "der.unfolding"},
-    "control='angle'": {"der.control", "der.snap", "der.relaxation"},
+    "error_bars=True, shapes=True": {
+        "der.analysis.error_bars",
+        "der.analysis.matching",
+        "der.analysis.full_ring",
+    },
+    "control='angle'": {"der.analysis.loading", "der.analysis.snap", "der.rod.relaxation"},
 }
 
 
@@ -154,7 +158,14 @@ def test_what_is_not_asked_for_is_not_imported(wants):
     assert set(json.loads(done.stdout)) == NEEDED[wants]
 
 
-SPATIAL = ("der.frames", "der.strain", "der.assembly", "der.equilibrium", "der.rod", "der.sector")
+SPATIAL = (
+    "der.kernels.quaternions",
+    "der.kernels.strain",
+    "der.kernels.assembly",
+    "der.rod.equilibrium",
+    "der.rod.rod",
+    "der.rod.gripped_ring",
+)
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,11 @@ import signal
 import time
 
 import pytest
-from bvp import scene
+from boundary_value import scene
 
 import der
-from der.unfinished import interrupts_between_states, interrupts_heard, put_off
-from validation.solving import solve
+from der.bvp.solve import solve
+from der.utils.interrupts import interrupts_between_states, interrupts_heard, put_off
 
 SOME = 20
 

@@ -1,39 +1,38 @@
-"""The ring as a boundary-value problem, and the rod held against it and other references.
+"""The evidence: rod against boundary-value problem against other codes; benchmark and stress test.
 
-    path = validation.solve(scene, tolerance=1e-8)   # a der.Path, as from der.fold
-    validation.packing_ratio(der.ellipse(0.8))       # of the folded ring, by the planar rod
+    python -m validation benchmark|stress     from a clone
 
-Names are imported when they are first used, so that ``import validation`` costs nothing.
+`solve`, `compare` and `packing_ratio` are those of `der`, under the names that scripts use.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from validation.comparison import Comparison, compare
-    from validation.figures import draw
-    from validation.packing import packing_ratio
-    from validation.planar import Folded, folded
-    from validation.solving import solve
+    from der import Comparison, compare, packing_ratio
+    from der import solve_bvp as solve
+    from der.bvp.folded_shape import Folded, folded
+    from der.paper import draw
 
 __all__ = ["Comparison", "Folded", "compare", "draw", "folded", "packing_ratio", "solve"]
 
 _HOME = {
-    "comparison": ("Comparison", "compare"),
-    "figures": ("draw",),
-    "packing": ("packing_ratio",),
-    "planar": ("Folded", "folded"),
-    "solving": ("solve",),
+    "Comparison": ("der.analysis.compare", "Comparison"),
+    "Folded": ("der.bvp.folded_shape", "Folded"),
+    "compare": ("der.analysis.compare", "compare"),
+    "draw": ("der.paper", "draw"),
+    "folded": ("der.bvp.folded_shape", "folded"),
+    "packing_ratio": ("der.bvp.packing", "packing_ratio"),
+    "solve": ("der.bvp.solve", "solve"),
 }
 
 
 def __getattr__(name: str) -> Any:
-    for module, names in _HOME.items():
-        if name in names:
-            value = getattr(import_module(f"validation.{module}"), name)
-            globals()[name] = value
-            return value
-    raise AttributeError(f"module 'validation' has no attribute {name!r}")
+    if name not in _HOME:
+        raise AttributeError(f"module 'validation' has no attribute {name!r}")
+    module, public = _HOME[name]
+    value = globals()[name] = getattr(import_module(module), public)
+    return value
 
 
 def __dir__() -> list[str]:

@@ -17,9 +17,9 @@ class Arguments(argparse.ArgumentParser):
     """
 
     def __init__(self, file: str, text: str | None) -> None:
-        place = File(file)
+        place = File(file).resolve().relative_to(File(__file__).resolve().parents[1])
         super().__init__(
-            prog=f"python -m {place.parent.name}.{place.stem}",
+            prog=f"python -m {'.'.join(place.with_suffix('').parts)}",
             description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,

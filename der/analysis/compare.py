@@ -1,0 +1,284 @@
+"""Rod against boundary-value problem: every state of the one held against the other's path.
+
+A state of the rod has errors in gamma, M and U; what can be compared without matching states is its
+normal distance from the curve of the boundary-value problem, in (gamma/pi, M/max|M|) and in
+(gamma/pi, U/max U). That curve is solved for at every gamma of the rod's states, with its exact
+slopes (dM/dgamma from the linearised problem, dU/dgamma = 4 M), so the distance is that from a
+tangent: no interpolation. Folds and limits are compared one by one.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from der.bvp.continuation import Visit
+from der.bvp.solve import solve_visits
+from der.records.path import Path, Point
+from der.scene import Scene
+from der.utils.files import Saved
+
+TOLERANCE = 1e-10  # of the boundary-value problem: below the rod's error bars
+SAME = 1e-9  # rad: two crossings of the same gamma
+FAR = 0.05  # of the scaled plane; what lies farther apart belongs to another branch
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of the rod and its counterpart."""
+
+    gamma: float  # rad
+    kind: str  # "" or the kind of special point
+    rod_moment: float  # GJ/a
+    rod_energy: float
+    bvp_moment: float
+    bvp_energy: float
+    moment_distance: float  # normal distance in (gamma/pi, M/max|M|)
+    moment_bar: float | None  # allowed there: the rod's error bars, and the other's tolerance
+    energy_distance: float
+    energy_bar: float | None
+
+    @property
+    def agrees(self) -> bool | None:
+        """Whether both distances lie within their bars; None where there are none."""
+        if self.moment_bar is None or self.energy_bar is None:
+            return None
+        return self.moment_distance <= self.moment_bar and self.energy_distance <= self.energy_bar
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A fold or limit of both paths."""
+
+    kind: str
+    rod: Point
+    bvp: Point
+    bar: float | None  # the rod's error of gamma there, rad, and the other's
+
+    @property
+    def difference(self) -> float:
+        """In gamma, rad."""
+        return abs(self.rod.gamma - self.bvp.gamma)
+
+
+@dataclass(frozen=True)
+class Comparison(Saved):
+    """A rod's path and that of its boundary-value problem."""
+
+    rod: Path
+    bvp: Path
+    states: tuple[State, ...]
+    pairs: tuple[Pair, ...]  # folds and limits, in path order
+    unmatched: int  # states of the rod, and special points of either, without a counterpart
+
+    @property
+    def within(self) -> float:
+        """Share of the states with error bars that agree within them; NaN where there are none."""
+        known = [state.agrees for state in self.states if state.agrees is not None]
+        return sum(known) / len(known) if known else math.nan
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """Largest distances in M and in U."""
+        return (
+            max((state.moment_distance for state in self.states), default=math.nan),
+            max((state.energy_distance for state in self.states), default=math.nan),
+        )
+
+    def to_json(self) -> str:
+        """JSON text: both records, and the differences."""
+        entries = {
+            "schema": 1,
+            "rod": json.loads(self.rod.to_json()),
+            "bvp": json.loads(self.bvp.to_json()),
+            "states": [asdict(state) | {"agrees": state.agrees} for state in self.states],
+            "pairs": [
+                {
+                    "kind": pair.kind,
+                    "rod_gamma": pair.rod.gamma,
+                    "bvp_gamma": pair.bvp.gamma,
+                    "difference": pair.difference,
+                    "bar": pair.bar,
+                }
+                for pair in self.pairs
+            ],
+            "unmatched": self.unmatched,
+            "within": None if math.isnan(self.within) else self.within,
+        }
+        return json.dumps(entries, allow_nan=False) + "\n"
+
+
+def compare(
+    scene: Scene,
+    rod: Path,
+    *,
+    tolerance: float = TOLERANCE,
+    progress: Callable[[float], object] | None = None,
+) -> Comparison:
+    """Hold the rod's path of a scene against the boundary-value problem's.
+
+    Parameters
+    ----------
+    scene : what was folded, by arc length.
+    rod : its path, from `der.fold`; with error bars (`Scene.error_bars`) to say whether it agrees.
+    tolerance : of the boundary-value problem, see `solve`.
+    progress : called with gamma [rad] after every state of the boundary-value problem.
+
+    Raises
+    ------
+    ValueError
+        For a scene that the boundary-value solver cannot do, or a path that is not of a rod.
+    NotConverged
+        Where the boundary-value problem's path cannot be followed to its end.
+    """
+    if rod.solver != "der":
+        raise ValueError(f"rod must be a path of a rod (solver 'der'), got {rod.solver!r}")
+    wanted = replace(
+        scene,
+        error_bars=False,
+        shapes=False,
+        save_at=tuple(sorted({g for g in rod.gamma.tolist() if 0.0 <= g <= _last(scene)})),
+    )
+    bvp, visits = solve_visits(wanted, tolerance=tolerance, progress=progress)
+    scales = (float(np.abs(bvp.moment).max()), float(np.abs(bvp.energy).max()))
+    kinds = {point.position: point.kind for point in rod.points}
+    regular = [visit for visit in visits if visit.kind != "fold"]
+    states = [
+        found
+        for k in range(len(rod))
+        if kinds.get(k) != "fold"
+        and (found := _state(rod, k, kinds.get(k, ""), regular, scales, tolerance)) is not None
+    ]
+    pairs, alone = _pairs(rod, bvp)
+    missing = len(rod) - len(rod.folds) - len(states)
+    return Comparison(rod, bvp, tuple(states), tuple(pairs), alone + missing)
+
+
+def _last(scene: Scene) -> float:
+    return math.inf if scene.until == "folded" else scene.gamma_max
+
+
+def _state(
+    rod: Path,
+    k: int,
+    kind: str,
+    visits: list[Visit],
+    scales: tuple[float, float],
+    tolerance: float,
+) -> State | None:
+    """State k of the rod beside the solution at its gamma that is nearest in M and U."""
+    gamma, moment, energy = (float(getattr(rod, n)[k]) for n in ("gamma", "moment", "energy"))
+
+    def apart(visit: Visit) -> float:
+        at = visit.at
+        return math.hypot((at.moment - moment) / scales[0], (at.energy - energy) / scales[1])
+
+    here = [visit for visit in visits if abs(visit.at.gamma - gamma) < SAME]
+    if not here:
+        return None
+    visit = min(here, key=apart)
+    at = visit.at
+    slopes = (at.slope, 4.0 * at.moment)
+    errors = _errors(rod, k)
+    own = (visit.error.moment, visit.error.energy)
+    distances: list[float] = []
+    bars: list[float | None] = []
+    for value, other, slope, scale, name, solved in zip(
+        (moment, energy),
+        (at.moment, at.energy),
+        slopes,
+        scales,
+        ("moment", "energy"),
+        own,
+        strict=True,
+    ):
+        steep = slope * math.pi / scale  # in the scaled plane
+        rise = other + slope * (gamma - at.gamma)
+        distances.append(abs(value - rise) / scale / math.hypot(1.0, steep))
+        if errors is None:
+            bars.append(None)
+            continue
+        vertical = (errors[name] + solved) / scale
+        horizontal = (errors["gamma"] + visit.error.gamma) / math.pi
+        bars.append((vertical + abs(steep) * horizontal) / math.hypot(1.0, steep) + tolerance)
+    if max(distances) > FAR:
+        return None
+    return State(
+        gamma,
+        kind,
+        moment,
+        energy,
+        at.moment,
+        at.energy,
+        distances[0],
+        bars[0],
+        distances[1],
+        bars[1],
+    )
+
+
+def _errors(rod: Path, k: int) -> Mapping[str, float] | None:
+    """Error bars of state k; None where one is not known."""
+    if rod.error is None:
+        return None
+    bars: Mapping[str, Any] = rod.error
+    errors = {name: bars[name][k] for name in ("gamma", "moment", "energy")}
+    return None if None in errors.values() else errors
+
+
+def _pairs(rod: Path, bvp: Path) -> tuple[list[Pair], int]:
+    """Folds and limits of both, matched in path order; and how many are left over."""
+    pairs: list[Pair] = []
+    alone = 0
+    for kind in ("fold", "limit"):
+        ours, theirs = ([p for p in path.points if p.kind == kind] for path in (rod, bvp))
+        alone += abs(len(ours) - len(theirs))
+        if len(ours) != len(theirs):
+            continue
+        for a, b in zip(ours, theirs, strict=True):
+            errors = _errors(rod, a.position)
+            solved: Mapping[str, Any] = bvp.error or {}
+            bar = None if errors is None else errors["gamma"] + solved["gamma"][b.position]
+            pairs.append(Pair(kind, a, b, bar))
+    return sorted(pairs, key=lambda pair: pair.rod.position), alone
+
+
+def table(comparison: Comparison) -> str:
+    """The differences in a few lines of text, for the terminal."""
+    rows = [f"{'':8}{'gamma':>12}{'M rod':>14}{'M bvp':>14}{'distance':>11}{'bar':>10}"]
+    asked = _asked(comparison)
+    for state in comparison.states:
+        if not state.kind and state.gamma not in asked:
+            continue
+        bar = "" if state.moment_bar is None else f"{state.moment_bar:10.1e}"
+        verdict = {True: "", False: "  beyond", None: ""}[state.agrees]
+        rows.append(
+            f"{state.kind:8}{state.gamma:12.8f}{state.rod_moment:14.9f}{state.bvp_moment:14.9f}"
+            f"{state.moment_distance:11.1e}{bar}{verdict}"
+        )
+    for pair in comparison.pairs:
+        bar = "" if pair.bar is None else f", bar {pair.bar:.1e}"
+        rows.append(
+            f"{pair.kind:8}{pair.rod.gamma:12.8f}{'':14}{pair.bvp.gamma:12.8f} by bvp: "
+            f"{pair.difference:.1e} rad apart{bar}"
+        )
+    moment, energy = comparison.largest
+    rows.append(f"largest normal distance: {moment:.1e} in M, {energy:.1e} in U (scaled planes)")
+    if not math.isnan(comparison.within):
+        rows.append(f"{100 * comparison.within:.1f} % of the states agree within their error bars")
+    if comparison.unmatched:
+        rows.append(f"{comparison.unmatched} states or special points have no counterpart")
+    return "\n".join(rows)
+
+
+def _asked(comparison: Comparison) -> set[float]:
+    """Gammas that the user asked for, or the multiples of pi/8."""
+    listed = comparison.rod.numerics.get("save_at")
+    if isinstance(listed, list):
+        return {*listed, math.pi}
+    return {k * math.pi / 8.0 for k in range(-80, 81)}

@@ -1,0 +1,113 @@
+"""From the states of a sector to what the record keeps of the full ring, in three dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from der.continuation.events import Visit
+from der.kernels.linking import unfold_lengths
+from der.kernels.quaternions import Array, rotation
+from der.records.configurations import Fall, Shapes, Softest
+from der.rod.gripped_ring import Sector
+from der.rod.rod import State
+from der.rod.stability import softest_modes
+
+if TYPE_CHECKING:
+    from der.analysis.snap import Landing
+
+STEPS = 90  # of a fall at most: three seconds of film
+# how a mode is mapped by the half-turns about E2 and E3, which map the state onto itself
+_SIGNS = {"out of phase": (1.0, -1.0), "odd": (-1.0, 1.0)}
+_HALF_TURNS = np.array([[-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+
+
+def shapes(
+    piece: Sector, visits: Sequence[Visit], arc_length: Array, *, history: bool, modes: bool
+) -> Shapes:
+    """Vertices and frames at every state, with how the ring falls and its softest modes if asked.
+
+    Parameters
+    ----------
+    arc_length : (N,) of the ring's frames.
+    history : whether landings hold the history of their relaxations.
+    modes : whether to compute the softest mode of each symmetry class at every state.
+    """
+    states = [visit.at.state for visit in visits]
+    x, frames = _whole(piece, states)
+    falls = _falls(piece, visits) if history else []
+    softest = _softest(piece, states) if modes else None
+    return Shapes(x, frames, tuple(falls), softest, arc_length)
+
+
+def _whole(piece: Sector, states: Sequence[State]) -> tuple[Array, Array]:
+    """Vertices (n, N, 3) and frames (n, N, 3, 3) of the ring."""
+    pairs = [piece.shape(state) for state in states]
+    return np.array([x for x, _ in pairs]), np.array([frames for _, frames in pairs])
+
+
+def _falls(piece: Sector, visits: Sequence[Visit]) -> list[Fall]:
+    """How the ring falls in the snaps among the visits."""
+    from der.analysis.snap import Landing
+
+    return [
+        _fall(piece, k - 1, visit)
+        for k, visit in enumerate(visits)
+        if isinstance(visit, Landing) and visit.history
+    ]
+
+
+def _fall(piece: Sector, after: int, landing: Landing) -> Fall:
+    """The history of a landing in steps of about equal length: it begins and ends slowly."""
+    x, frames = _whole(piece, landing.history)
+    steps = [float(np.linalg.norm(b - a, axis=1).max()) for a, b in pairwise(x)]
+    way = np.append(0.0, np.cumsum(steps))
+    chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], STEPS)))
+    gamma = np.array([state.load for state in landing.history])
+    energy = np.array(landing.energies)
+    return Fall(after, gamma[chosen], energy[chosen], x[chosen], frames[chosen])
+
+
+def _softest(piece: Sector, states: Sequence[State]) -> Softest:
+    """The softest mode of each symmetry class, and the ring displaced by the softest of all.
+
+    Of the two signs of a mode the one nearer to that of the state before is taken.
+    """
+    eigenvalues = np.empty((len(states), len(piece.classes)))
+    u: list[Array] = []
+    for k, state in enumerate(states):
+        found = {}
+        for c, (label, (_, modes)) in enumerate(piece.classes.items()):
+            eigenvalues[k, c : c + 1], (mode,) = softest_modes(piece.body, piece.held, modes, state)
+            found[label] = mode
+        label = list(found)[int(np.argmin(eigenvalues[k]))]
+        moved = displacements(piece, state, label, found[label])
+        u.append(-moved if u and np.vdot(moved, u[-1]) < 0.0 else moved)
+    return Softest(tuple(piece.classes), eigenvalues, np.array(u))
+
+
+def displacements(piece: Sector, state: State, label: str, mode: Array) -> Array:
+    """Displacements (N, 3) of the ring's vertices in a mode (n, b) of the class ``label``.
+
+    Notes
+    -----
+    A rotation w, in the frame R itself, turns the tangent d3 by (R w) x d3. A half-turn that runs
+    the curve backwards maps edges onto the negatives of edges. The arms of an odd mode move alike:
+    of its pair the one is taken that is even under the half-turn about E3.
+    """
+    turn = rotation(state.quat)
+    d3 = turn[:, :, 2]
+    rate = np.cross((turn @ mode[:, :3, None])[..., 0], d3) * (1.0 + state.stretch[:, None])
+    rate += mode[:, 3:].sum(axis=1, keepdims=True) * d3
+    mapped = -np.array(_SIGNS.get(label, (1.0, 1.0)))[:, None] * _HALF_TURNS
+    if piece.copies == 4:
+        rate = np.concatenate([mapped[0] * rate[:0:-1], rate])
+    if piece.copies > 1:
+        rate = np.concatenate([rate, mapped[1] * rate[-2:0:-1]])
+    edges = unfold_lengths(piece.body.length, piece.copies)[:, None] * rate
+    u: Array = np.cumsum(edges, axis=0)
+    grips = (u - 0.5 * edges)[[0, len(u) // 2]]
+    return u - grips.mean(axis=0)

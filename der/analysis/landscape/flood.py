@@ -1,0 +1,182 @@
+"""Minima over a grid of twist and grip distance, carried from cell to cell until nothing is new.
+
+From a minimum in one cell, Newton's method looks for one in each of the four cells beside it; where
+that leads to no minimum, dynamic relaxation does. What is new to its cell spreads on in turn: each
+cell is reached in several directions, and sheets of minima that join somewhere are all found. A
+sheet of its own is met only by chance: minima are shaken along their softest modes for that.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from der.kernels.quaternions import Array, rotation_vector
+from der.rod.equilibrium import ADVICE, Direction, Equilibrium, equilibrium, moved
+from der.rod.gripped_ring import Sector
+from der.rod.relaxation import relax
+from der.rod.rod import State, edges
+from der.rod.stability import all_modes, softest_modes
+from der.rod.supports import Supports
+
+MOST_MINIMA = 6  # in one cell
+_SAME = 1e-6  # rad, root mean square: two minima that are one
+_NEAR = 0.5  # rad, likewise: a neighbour on the same sheet
+_PIECES = (1, 4)  # of the way to a neighbour, before the state is let fall
+_RELAXED = 1e-6  # GJ/a, residual at which Newton's method takes over
+_MOST_GRADIENTS = 3000
+_SHAKE = 1.0  # rad, root mean square
+_SHAKEN = 2  # modes
+
+Cell = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """A minimum in a cell."""
+
+    at: Equilibrium
+    energy: float  # of the full ring
+
+
+@dataclass
+class Flood:
+    """The grid, what was found in its cells, and why nothing was."""
+
+    piece: Sector
+    held: Supports
+    share: float  # of the grip distance that the sector spans
+    gamma: Array
+    distance: Array
+    tolerance: float
+    ceiling: float  # energy above which a cell has one minimum at most, its lowest
+    minima: dict[Cell, list[Minimum]] = field(default_factory=dict)
+    reasons: dict[Cell, str] = field(default_factory=dict)
+
+    def supports(self, distance: float) -> Supports:
+        """The supports with the grips at a distance."""
+        target = self.held.target.copy()
+        target[-1] = self.share * distance
+        return self.held._replace(target=target)
+
+    def solve(self, cell: Cell, start: State) -> Equilibrium | None:
+        """A minimum in ``cell`` from a state nearby; None, and the reason kept, without one."""
+        i, j = cell
+        held, body = self.supports(self.distance[j]), self.piece.body
+        for pieces in _PIECES:
+            at = self._walked(cell, start, pieces)
+            if _is_minimum(held, at) and _apart(self.piece, start, at.state) < _NEAR:
+                return at
+        begin = self._turned(start, self.gamma[i])
+        fall = relax(body, held, begin, tolerance=_RELAXED, most=_MOST_GRADIENTS)
+        if fall.rests:
+            at = equilibrium(body, held, fall.state, tolerance=self.tolerance)
+            if _is_minimum(held, at):
+                return at
+        if at.converged:
+            self.reasons[cell] = "only saddles were found here"
+        else:
+            self.reasons[cell] = f"no minimum was found from any neighbour: {ADVICE[at.outcome]}"
+        return None
+
+    def _walked(self, cell: Cell, start: State, pieces: int) -> Equilibrium:
+        """The equilibrium in ``cell`` by Newton's method, in pieces of the way from a state."""
+        span = float(edges(self.piece.body, start)[:, 2].sum()) / self.share
+        goal = (self.gamma[cell[0]], self.distance[cell[1]])
+        state = start
+        for k in range(1, pieces + 1):
+            gamma, distance = (
+                a + (b - a) * k / pieces for a, b in zip((start.load, span), goal, strict=True)
+            )
+            begin = self._turned(state, goal[0] if k == pieces else gamma)
+            held = self.supports(goal[1] if k == pieces else distance)
+            at = equilibrium(self.piece.body, held, begin, tolerance=self.tolerance)
+            if not at.converged:
+                break
+            state = at.state
+        return at
+
+    def _turned(self, start: State, gamma: float) -> State:
+        """``start`` with the grips turned to ``gamma``, nothing else moved."""
+        nothing = np.zeros(len(self.held.target))
+        turn = Direction(np.zeros(self.held.free.shape), nothing, float(gamma) - start.load)
+        return moved(self.held, start, turn).but(load=float(gamma))
+
+    def add(self, cell: Cell, at: Equilibrium) -> bool:
+        """Whether a minimum is new to its cell, which then has it."""
+        known = self.minima.setdefault(cell, [])
+        energy = self.piece.copies * at.energy
+        if len(known) >= MOST_MINIMA or (known and energy > self.ceiling):
+            return False
+        if any(_apart(self.piece, one.at.state, at.state) < _SAME for one in known):
+            return False
+        known.append(Minimum(at, energy))
+        self.reasons.pop(cell, None)
+        return True
+
+    def among(self, cell: Cell) -> list[Minimum]:
+        """The minima of a cell, lowest first, without others above the ceiling."""
+        found = sorted(self.minima.get(cell, ()), key=lambda one: one.energy)
+        return found[:1] + [one for one in found[1:] if one.energy <= self.ceiling]
+
+    def neighbours(self, cell: Cell) -> list[Cell]:
+        """Cells beside, above and below."""
+        i, j = cell
+        around = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
+        n, m = len(self.gamma), len(self.distance)
+        return [(a, b) for a, b in around if 0 <= a < n and 0 <= b < m]
+
+
+def spread(
+    flood: Flood,
+    seeds: Iterable[tuple[Cell, State]],
+    pressed: list[int],
+    progress: Callable[[float], object] | None,
+) -> None:
+    """Fill the grid from states near some of its cells on, until no neighbour is new or Ctrl-C."""
+    waiting: deque[tuple[Cell, Equilibrium]] = deque()
+    for cell, state in seeds:
+        if not pressed:
+            _try(flood, cell, state, waiting)
+    cells = len(flood.gamma) * len(flood.distance)
+    while waiting and not pressed:
+        cell, at = waiting.popleft()
+        for neighbour in flood.neighbours(cell):
+            _try(flood, neighbour, at.state, waiting)
+        if progress is not None:
+            progress(len(flood.minima) / cells)
+
+
+def shaken(flood: Flood, across: int) -> Iterator[tuple[Cell, State]]:
+    """Minima of some cells, about ``across`` in each direction, kicked far along soft modes."""
+    n, m = len(flood.gamma), len(flood.distance)
+    body = flood.piece.body
+    root = float(np.sqrt(body.length.sum()))
+    nothing = np.zeros(len(flood.held.target))
+    for i, j in product(range(0, n, max(n // across, 1)), range(0, m, max(m // across, 1))):
+        for one in flood.among((i, j))[:1]:
+            held, state = flood.supports(flood.distance[j]), one.at.state
+            _, modes = softest_modes(body, held, all_modes(held), state, _SHAKEN)
+            for mode, sign in product(modes, (1.0, -1.0)):
+                kick = Direction(sign * _SHAKE * root * mode, nothing, 0.0)
+                yield (i, j), moved(held, state, kick)
+
+
+def _try(flood: Flood, cell: Cell, start: State, waiting: deque[tuple[Cell, Equilibrium]]) -> None:
+    at = flood.solve(cell, start)
+    if at is not None and flood.add(cell, at):
+        waiting.append((cell, at))
+
+
+def _is_minimum(held: Supports, at: Equilibrium) -> bool:
+    return at.converged and at.negative == len(held.target)
+
+
+def _apart(piece: Sector, a: State, b: State) -> float:
+    """Root mean square of the rotations between two states [rad]."""
+    w = rotation_vector(a.quat, b.quat)
+    return float(np.sqrt(np.sum(piece.body.mass * w * w)))

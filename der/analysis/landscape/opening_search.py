@@ -1,0 +1,182 @@
+"""The search for the push of least work: pairs of points, with all tools at each.
+
+On a grid first, and of pairs that a symmetry of the folded ring maps onto each other one; then
+between the points of the grid, around the best of each kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from der.analysis.landscape.actuators import struts, wrenches
+from der.analysis.landscape.barrier import ALIKE, name_of_rest
+from der.analysis.landscape.landscape import scene_sector
+from der.analysis.landscape.opening_path import March, Moment, march
+from der.records.opening import ALIKE as TIE
+from der.records.opening import KINDS, Instant, Push, least_of
+from der.rod.free_ring import Alone
+from der.scene import Scene
+
+_UNIFORM = 1e-9  # of cells and natural strains that are alike
+_COARSER = 4  # a point that stands on a mesh of N/4 edges, too, as error bars need it
+
+Pair = tuple[int, int]
+
+
+@dataclass
+class Search:
+    """A folded ring, and what pushing it has come to so far."""
+
+    scene: Scene
+    folded: Alone
+    ends: dict[str, float]  # energies of the rests, by name
+    most: float  # work beyond which a push is not followed
+    found: dict[Pair, list[tuple[Push, March]]] = field(default_factory=dict)
+
+    def at(self, pair: Pair) -> list[tuple[Push, March]]:
+        """What all tools come to at one pair of points."""
+        if pair not in self.found:
+            energy = self.ends["folded"]
+            self.found[pair] = []
+            for tool in struts(self.folded, pair) + wrenches(self.folded, pair):
+                done = march(
+                    tool,
+                    energy,
+                    ALIKE * abs(energy),
+                    tolerance=self.scene.tolerance,
+                    most=self.most,
+                )
+                if done.last is not None and done.line and done.last.index[0] == 0:
+                    self.found[pair].append((_push(self, done), done))
+        return self.found[pair]
+
+    @property
+    def all(self) -> list[tuple[Push, March]]:
+        """Everything found so far."""
+        return [one for several in self.found.values() for one in several]
+
+    def least(self, *, dead: bool) -> dict[str, int]:
+        """Positions of the least pushes, by kind."""
+        pushes = [push for push, _ in self.all]
+        places = {kind: least_of(pushes, kind, dead=dead) for kind in KINDS}
+        return {kind: k for kind, k in places.items() if k is not None}
+
+
+def scan(
+    search: Search, grid: int, pressed: list[int], progress: Callable[[float], object] | None
+) -> None:
+    """Try all tools at the pairs of a grid; ``progress`` is called with the share that is done."""
+    pairs = list(_pairs(search, grid))
+    for k, pair in enumerate(pairs):
+        if pressed:
+            return
+        search.at(pair)
+        if progress is not None:
+            progress((k + 1) / len(pairs))
+
+
+def _pairs(search: Search, grid: int) -> Iterator[Pair]:
+    """Pairs of edges on a grid, one of all that the ring's symmetries map onto each other."""
+    n = search.scene.n_edges
+    stride = n // grid
+    for i in range(0, n, stride):
+        for j in range(i + stride, n, stride):
+            if (i, j) == same_pair(search, (i, j)):
+                yield i, j
+
+
+def same_pair(search: Search, pair: Pair) -> Pair:
+    """The first of the pairs that a symmetry of the folded ring maps onto each other."""
+    n, body = search.scene.n_edges, search.folded.body
+    i, j = pair
+    if np.ptp(body.cell) < _UNIFORM and np.all(np.ptp(body.rest, axis=0) < _UNIFORM):
+        apart = (j - i) % n
+        return 0, min(apart, n - apart)
+    images = [(i, j), (-i, -j)]
+    if search.scene.ring.symmetry == "D2":
+        images += [(n // 2 - i, n // 2 - j), (n // 2 + i, n // 2 + j)]
+    first, second = min(sorted((a % n, b % n)) for a, b in images)
+    return first, second
+
+
+def refine(search: Search, stride: int, barrier: float | None, pressed: list[int]) -> None:
+    """Go on between the points of the grid, around the best of each kind.
+
+    A slow push that takes no more than the barrier cannot be bettered.
+    """
+    finest = _COARSER if search.scene.error_bars else 1
+    while stride % (2 * finest) == 0:
+        stride //= 2
+        for dead in (False, True):
+            for kind in KINDS:
+                _descend(search, kind, stride, barrier, pressed, dead=dead)
+
+
+def _descend(
+    search: Search,
+    kind: str,
+    stride: int,
+    barrier: float | None,
+    pressed: list[int],
+    *,
+    dead: bool,
+) -> None:
+    """From the best push of a kind to one next to it that is better, until there is none."""
+    before = None
+    while not pressed:
+        best = search.least(dead=dead).get(kind)
+        if best is None or best == before:
+            return
+        push, _ = search.all[best]
+        if not dead and barrier is not None and push.held.work < (1.0 + TIE) * barrier:
+            return
+        for pair in _around(search, push.edges, stride):
+            search.at(pair)
+        before = best
+
+
+def _around(search: Search, pair: Pair, stride: int) -> list[Pair]:
+    n = search.scene.n_edges
+    steps = (-stride, 0, stride)
+    near = {((pair[0] + a) % n, (pair[1] + b) % n) for a in steps for b in steps}
+    return sorted({same_pair(search, one) for one in near if one[0] != one[1]})
+
+
+def _push(search: Search, done: March) -> Push:
+    tool = done.tool
+    if done.last is None:
+        raise ValueError("march must have come somewhere, got none")
+    s = scene_sector(search.scene, "full").arc_length / search.scene.ring.length
+    energy = search.ends["folded"]
+    first, second, third = tool.axis.tolist()
+    line = np.array(done.line)
+    return Push(
+        tool.kind,
+        (float(s[tool.points[0]]), float(s[tool.points[1]])),
+        tool.points,
+        tool.direction,
+        (first, second, third),
+        _instant(search, done.last),
+        None if done.dead is None else _instant(search, done.dead),
+        done.opens(done.last),
+        done.opens(done.dead),
+        done.peak,
+        done.falls,
+        np.column_stack([line[:, :2], line[:, 2] - energy]),
+        done.why,
+    )
+
+
+def _instant(search: Search, moment: Moment) -> Instant:
+    return Instant(
+        moment.kind,
+        moment.push,
+        moment.force,
+        moment.work,
+        moment.energy - search.ends["folded"],
+        *moment.index,
+        "" if moment.lands is None else name_of_rest(moment.lands, search.ends),
+    )

@@ -1,0 +1,151 @@
+"""Saddles of a ring left alone: uphill along one mode, downhill along all others.
+
+Eigenvector following (Cerjan and Miller 1981; Wales 1994). In the eigenbasis of the Hessian on the
+conditions Newton's step is -g/mu, which climbs where mu < 0 and descends where mu > 0. With its
+sign turned in the few modes in which that is not wanted, it climbs along the followed mode alone,
+and converges to a saddle of index 1 where Newton's method would go to whatever is next. One
+factorisation and the softest modes a step: O(N).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from der.kernels.assembly import assemble, take_out
+from der.kernels.block_ldl import factor, solve_refined
+from der.kernels.quaternions import Array
+from der.rod.equilibrium import Direction, Equilibrium, moved
+from der.rod.free_ring import Alone, balance
+from der.rod.rod import Rod, State
+from der.rod.stability import all_modes, softest_modes
+from der.rod.supports import Supports
+
+_LONGEST = 0.05  # rad, root mean square, of a step; thin strips (h/t = 30) do not follow 0.1
+_NEARLY = 1e-5  # GJ/a, largest force: Newton's method takes over
+_SOFT = 0.02  # of the softest torsion, GJ (2 pi/L)^2: no step is longer than a mode this soft asks
+_STEPS = 100
+_MODES = 5  # looked at in each step: more never point down on the way
+
+
+@dataclass(frozen=True)
+class Climb:
+    """Where following a mode has led."""
+
+    alone: Alone
+    at: Equilibrium
+    index: int | None
+    steps: int
+
+    @property
+    def is_saddle(self) -> bool:
+        """Whether it is a saddle of index 1."""
+        return self.at.converged and self.index == 1
+
+
+def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | None:
+    """The equilibrium that following a mode uphill leads to; None where it leads nowhere.
+
+    Parameters
+    ----------
+    along : (n, b) mode to follow, of unit norm in the edges' lengths.
+    kick : (n, b) displacement added to the start [rad].
+    """
+    here, mode = start, along
+    if kick is not None:
+        here = displaced(here, kick)
+    for step in range(_STEPS):
+        held = here.pinned()
+        state = here.state
+        found = newton_step(here.body, held, state)
+        if found is None:
+            return None
+        newton, grad = found
+        if float(np.abs(grad).max()) < _NEARLY:
+            return _polished(here, step)
+        values, modes = softest_modes(here.body, held, all_modes(held), state, _MODES)
+        # far from the saddle the followed mode is known by its shape, near to it as the only one
+        overlap = [abs(float(np.sum(here.body.length[:, None] * mode * m))) for m in modes]
+        chosen = int(np.argmax(overlap))
+        if np.sum(values < 0.0) == 1:
+            chosen = int(np.argmin(values))
+        mode = modes[chosen]
+        here = displaced(here, _turned(here, newton, grad, values, modes, chosen))
+        if not np.isfinite(here.residual):
+            return None
+    return None
+
+
+def downhill_modes(alone: Alone, count: int = 4) -> list[Array]:
+    """Modes (n, b) of negative stiffness among the ``count`` softest, the softest first."""
+    held = alone.pinned()
+    values, modes = softest_modes(alone.body, held, all_modes(held), alone.state, count)
+    order = np.argsort(values)
+    return [modes[k] for k in order if values[k] < 0.0]
+
+
+def _turned(
+    here: Alone, newton: Array, grad: Array, values: Array, modes: Array, chosen: int
+) -> Array:
+    """Newton's step (n, b) turned in the softest modes: uphill along the chosen one, else down."""
+    length = float(here.body.length.sum())
+    softest = _SOFT * float(here.body.stiffness.min()) * (2.0 * np.pi / length) ** 2
+    step = newton.copy()
+    for k, (value, mode) in enumerate(zip(values, modes, strict=True)):
+        slope = float(np.sum(grad * mode))
+        sense = 1.0 if k == chosen else -1.0
+        step += (sense * slope / max(abs(value), softest) + slope / value) * mode
+    size = float(np.sqrt(np.sum(here.body.mass * step**2)))
+    return step * min(1.0, _LONGEST / max(size, 1e-300))
+
+
+@njit(cache=True)
+def _system(rod, held, quat, stretch, force):
+    """Newton's step (n, b, 1) at fixed load, the gradient, and whether the matrix is regular."""
+    system = assemble(rod, held, quat, stretch, force, 0.0)
+    diag, off, border = take_out(held.free, system.diag, system.off, system.border)
+    n, b, m = border.shape
+    x, y, z = np.zeros((n, b, 1)), np.zeros((m, 1)), np.zeros(1)
+    none, no_row = np.zeros(m), np.zeros((n, b))
+    for j in range(n):
+        for i in range(b):
+            if not held.free[j, i]:
+                system.grad[j, i] = 0.0
+            x[j, i, 0] = -system.grad[j, i]
+    factors = factor(diag, off, border)
+    solved = factors.negative >= 0 and solve_refined(
+        diag, off, factors, m, no_row, none, no_row, none, 1.0, x, y, z
+    )
+    return x, system.grad, solved
+
+
+def newton_step(body: Rod, held: Supports, state: State) -> tuple[Array, Array] | None:
+    """Newton's step and the gradient (n, b); None where the matrix is singular."""
+    step, grad, solved = _system(body, held, state.quat, state.stretch, state.force)
+    return (step[:, :, 0], grad) if solved else None
+
+
+def displaced(here: Alone, w: Array) -> Alone:
+    """A ring displaced by ``w`` (n, b), on its conditions again, with the best forces."""
+    held, load = here.held, here.state.load
+    nothing = np.zeros(len(held.target))
+    state = moved(held, here.state, Direction(w, nothing, 0.0))
+    free = held.free.ravel()
+    for _ in range(8):
+        system = assemble(here.body, held, state.quat, state.stretch, nothing, load)
+        if float(np.abs(system.gap).max()) < 1e-12:
+            break
+        border = system.border.reshape(len(free), -1)[free]
+        back = np.zeros(held.free.shape)
+        back[held.free] = np.linalg.lstsq(border.T, -system.gap, rcond=None)[0]
+        state = moved(held, state, Direction(back, nothing, 0.0))
+    return balance(here.body, state.quat, state.stretch, held, load)
+
+
+def _polished(here: Alone, steps: int) -> Climb:
+    """The equilibrium next to it, and its index with all that it leaves free."""
+    at = here.polished()
+    alone = balance(here.body, at.state.quat, at.state.stretch, here.held, here.state.load)
+    return Climb(alone, at, alone.index() if at.converged else None, steps)

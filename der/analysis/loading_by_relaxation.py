@@ -1,0 +1,229 @@
+"""Marching by dynamic relaxation alone: no Hessian, no factorisation, only forces.
+
+The grips turn in steps, and after each the ring comes to rest from where the last states lead. A
+state that rests elsewhere has snapped, and so has one whose energy is not that of the last and the
+work of the grips in between: a long step reaches other branches that lie close by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from der.analysis.snap import Landing
+from der.analysis.trail import CLOSE, ahead, is_work, longer, rested, went_on
+from der.continuation.events import Visit, Wanted
+from der.continuation.interpolant import between
+from der.continuation.step import Stuck, Tally
+from der.rod import relaxation
+from der.rod.equilibrium import Direction, Equilibrium, moved
+from der.rod.gripped_ring import Sector
+from der.rod.relaxation import Relaxed, relax
+from der.rod.rod import State
+
+RISE = math.pi / 64.0  # rad, step of a march by dynamic relaxation alone
+RESOLUTION = 1e-6  # rad, of where such a march finds a snap
+_LONGER = 4.0  # times the last step: further ahead, nothing is known of where states lead
+_NARROW = 0.01  # of the way between two states, a parabola through a limit of M
+
+
+def follow_relaxed(
+    piece: Sector,
+    wanted: Wanted,
+    tally: Tally,
+    *,
+    start: Equilibrium | None = None,
+    unload: bool = False,
+    rise: float = RISE,
+    tolerance: float = 1e-9,
+    every: int = 0,
+) -> Iterator[Visit]:
+    """Hand out the minima at given gamma, each by dynamic relaxation: no Hessian anywhere.
+
+    Gamma goes in steps of ``rise`` [rad] and through every load that is asked for. Limits of the
+    moment are located by parabolas through relaxed states; a state that is not where the last ones
+    lead has snapped, and where is bracketed by bisection to `RESOLUTION` ("gamma_uncertainty" of
+    the landing). Indices are not known, contacts not looked for; tangents and slopes are
+    differences of second order; ``tolerance`` is that of `relaxation.relax`.
+
+    Raises
+    ------
+    Stuck
+        Where a state does not come to rest.
+    """
+    walk = _Walk(piece, wanted, tally, rise, tolerance, every)
+    last = start
+    for one in _with_limits(walk, _relaxed_states(walk, start)):
+        last = one.at
+        yield one
+    if unload:
+        back = replace(walk, wanted=replace(wanted, load_max=0.0))
+        states = _with_limits(back, _relaxed_states(back, last))
+        next(states)  # the state at which loading has ended
+        yield from states
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """What the states of one march by relaxation share."""
+
+    piece: Sector
+    wanted: Wanted
+    tally: Tally
+    rise: float
+    tolerance: float
+    every: int
+
+    def relaxed(self, start: State, every: int = 0) -> Relaxed:
+        """The state of rest at the load of ``start``.
+
+        Raises
+        ------
+        Stuck
+            Where there is none.
+        """
+        found = relax(
+            self.piece.body, self.piece.held, start, tolerance=self.tolerance, every=every
+        )
+        self.tally.force_evaluations += found.evaluations
+        if not found.rests:
+            where = f"vertex {found.where} " if found.where >= 0 else ""
+            raise Stuck(
+                f"at gamma = {start.load:.8f} the ring {where}{relaxation.ADVICE[found.outcome]}"
+            )
+        return found
+
+    def loads(self, first: float) -> list[float]:
+        """Loads to relax at, in the order of the march from ``first``."""
+        last = self.wanted.load_max
+        low, high = min(first, last), max(first, last)
+        if high - low > self.wanted.most_steps * self.rise:
+            raise Stuck(f"the march would not end within {self.wanted.most_steps} steps")
+        grid = [k * self.rise for k in range(math.ceil(low / self.rise), int(high / self.rise) + 1)]
+        asked = self.wanted.targets
+        if asked is None:
+            eighth = math.pi / 8.0
+            asked = tuple(
+                k * eighth for k in range(math.ceil(low / eighth), int(high / eighth) + 1)
+            )
+        asked = (*(load for load in (*asked, math.pi) if low <= load <= high), last)
+        # a step of the grid that all but meets a load that is asked for is left out
+        near = 0.1 * self.rise
+        grid = [load for load in grid if min(abs(load - one) for one in asked) > near]
+        return sorted({*grid, *asked} - {first}, reverse=last < first)
+
+
+def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Visit]:
+    """Relaxed states at the loads of a march, with landings where the ring has snapped."""
+    piece = walk.piece
+    first = walk.relaxed(piece.start if start is None else start.state)
+    trail = [rested(piece, [], first)]
+    yield Visit(trail[-1])
+    largest = 0.0  # moment so far
+    loads = walk.loads(first.state.load)[::-1]
+    while loads:
+        here = trail[-1].state.load
+        if len(trail) > 1:
+            longest = _LONGER * (here - trail[-2].state.load)
+            if abs(loads[-1] - here) > abs(longest):
+                loads.append(here + 0.5 * longest)
+        found = walk.relaxed(ahead(piece, trail, loads[-1]))
+        walk.tally.steps += 1
+        largest = max(largest, abs(found.moment))
+        if went_on(piece, trail, found) and is_work(trail, found, largest):
+            loads.pop()
+            at = rested(piece, trail, found)
+            trail = longer(piece, trail, found)
+            yield Visit(at)
+        elif abs(loads[-1] - here) > RESOLUTION:
+            loads.append(0.5 * (here + loads[-1]))
+        else:
+            landing = _landed(walk, trail, loads.pop())
+            trail = [landing.at]
+            yield landing
+
+
+def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
+    """The state that a ring has snapped to between the last state of a trail and ``load``."""
+    piece, before = walk.piece, trail[-1]
+    found = walk.relaxed(ahead(piece, trail, load), walk.every)
+    rise = load - before.state.load
+    energy = piece.copies * (before.energy + before.moment * rise)
+    details: dict[str, object] = {
+        "gamma_fold": load,
+        "gamma_uncertainty": abs(rise),
+        "energy_before": energy,
+        "energy_after": piece.copies * found.energy,
+        "energy_released": energy - piece.copies * found.energy,
+        "moment_before": piece.moment(before.moment),
+        "moment_after": piece.moment(found.moment),
+        "force_evaluations": found.evaluations,
+    }
+    energies = tuple(piece.copies * float(e) for e in found.energies)
+    at = rested(piece, [], found)
+    return Landing(at, "snap", details=details, history=found.history, energies=energies)
+
+
+def _with_limits(walk: _Walk, states: Iterator[Visit]) -> Iterator[Visit]:
+    """The visits with the limits of the moment put in, each state a step late."""
+    window: list[list[Visit]] = []  # each with those that are all but the same state
+    for one in states:
+        if one.kind == "snap":
+            for same in window[1:]:
+                yield from same
+            window = []
+        if window and abs(one.at.state.load - window[-1][0].at.state.load) <= CLOSE:
+            window[-1].append(one)
+        else:
+            window.append([one])
+        if len(window) == 1:
+            yield one
+        if len(window) < 3 or len(window[-1]) > 1:
+            continue
+        a, b, c = (same[0].at for same in window)
+        turn = list(window[1])
+        if (b.moment - a.moment) * (c.moment - b.moment) < 0.0:
+            turn.append(_turning(walk, a, b, c))
+        yield from sorted(turn, key=lambda v: v.at.state.load, reverse=c.state.load < b.state.load)
+        window.pop(0)
+    for same in window[1:]:
+        yield from same
+
+
+def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Visit:
+    """The limit of the moment among three relaxed states: bracketed (Brent), then by a parabola.
+
+    All of their states lie between the three: a little beyond, there may be a snap. Towards a fold
+    the moment is no parabola, and the first that comes to mind is far off.
+    """
+    from scipy.optimize import minimize_scalar
+
+    low, high = sorted((a.state.load, c.state.load))
+    h = _NARROW * (high - low)
+    sign = 1.0 if b.moment < a.moment else -1.0
+
+    def moment(load: float) -> float:
+        return sign * _between(walk, a, c, load).moment
+
+    found = minimize_scalar(moment, bounds=(low, high), method="bounded", options={"xatol": h})
+    load = min(max(float(found.x), low + h), high - h)
+    load = _vertex([_between(walk, a, c, x) for x in (load - h, load, load + h)])
+    return Visit(_between(walk, a, c, min(max(load, low), high)), "limit")
+
+
+def _vertex(trail: list[Equilibrium]) -> float:
+    """Load at which a parabola through three moments is stationary."""
+    x, y, z = (at.state.load for at in trail)
+    p, q, r = (at.moment for at in trail)
+    first, second = (q - p) / (y - x), (r - q) / (z - y)
+    return y if first == second else 0.5 * (x + y) - 0.5 * first * (z - x) / (second - first)
+
+
+def _between(walk: _Walk, a: Equilibrium, c: Equilibrium, load: float) -> Equilibrium:
+    """The relaxed state at a load between those of two others."""
+    part = (load - a.state.load) / (c.state.load - a.state.load)
+    step = between(walk.piece.held, a.state, c.state)
+    guess = Direction(part * step.q, 0.0 * step.force, load - a.state.load)
+    found = walk.relaxed(moved(walk.piece.held, a.state, guess).but(load=load))
+    return rested(walk.piece, [a], found)

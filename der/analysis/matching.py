@@ -1,0 +1,228 @@
+"""The same state on three meshes, and where it lies on the curve that they extrapolate to.
+
+Frames sit on the same material points at every resolution, so every second (fourth) frame of a
+state on N edges is nearly a state on N/2 (N/4), and Newton's method makes it one in two or three
+iterations, folds or not, if its corrections stay in the plane normal to the path of N edges:
+
+    N      ----o---->  tangent        the three states of a plane are *matched*: gamma, M, U and
+    N/2    ....|.....                 their rates along the tangent have errors in even powers
+    N/4    ....|.....                 of h, h^2 first
+
+What is sought (a gamma that was asked for, a fold, a limit) is a root, along the path of N edges,
+of the extrapolated curve.
+
+Sources: Richardson (1911), Phil. Trans. A 210; Romberg (1955), K. Norske Vid. Selsk. Forh. 28.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from der.analysis.mesh_transfer import Restricted, restricted
+from der.continuation.events import Visit
+from der.kernels.quaternions import Array
+from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
+from der.rod.gripped_ring import Sector
+
+LEVELS = 3
+GAMMA, MOMENT, ENERGY = 0, 1, 2  # columns of a table of values
+RATE = 3  # added to these: columns of the rates along the path
+
+# weights of the values at h, 2h and 4h: (4, -1)/3 for one term, and (16, -1)/15 of two such
+_ROMBERG = np.array([[1.0, 0.0, 0.0], [4.0 / 3.0, -1.0 / 3.0, 0.0], [64 / 45, -20 / 45, 1 / 45]])
+_PROBE = 1e-3  # of s: the first step towards a fold or limit, whose second derivative is not known
+_SMALL = 1e-6  # of s: a step that is as good as its linear prediction, to the square of this
+FARTHEST = 0.3  # of s: about two steps of the path; what is sought lies h^2 away
+_MOST = 12  # steps of the secant method
+
+
+class Matched(NamedTuple):
+    """Three matched states."""
+
+    table: Array  # (LEVELS, 6) gamma, M, U and their rates per s, finest level first
+    residual: float  # the largest of the three
+    coarse: Restricted | None = None  # where those of the coarser meshes lie
+
+
+@dataclass(frozen=True)
+class Family:
+    """The curves of equilibria on three meshes, matched along the finest."""
+
+    pieces: tuple[Sector, ...]
+    tolerance: float
+
+    def values(self, level: int, at: Equilibrium) -> tuple[float, float, float]:
+        """Return gamma [rad], M of one arm [GJ/a] and U of the full ring [GJ/a]."""
+        piece = self.pieces[level]
+        return at.state.load, piece.moment(at.moment), piece.copies * at.energy
+
+    def matched(self, fine: Equilibrium, near: Restricted | None = None) -> Matched | None:
+        """The states matched to one on the finest mesh; None where a level has none.
+
+        ``near`` : those of a state nearby, to start from.
+        """
+        found = restricted(self.pieces, fine, near, self.tolerance)
+        if found is None:
+            return None
+        table = np.array(
+            [
+                self._line(0, fine, 1.0, 0.0),
+                *(self._line(k, x.at, x.speed, x.beyond) for k, x in enumerate(found, start=1)),
+            ]
+        )
+        residual = max(fine.residual, found.half.at.residual, found.quarter.at.residual)
+        return Matched(table, residual, found)
+
+    def _line(self, level: int, at: Equilibrium, speed: float, beyond: float) -> list[float]:
+        """Values and rates at a level; ``speed`` turns the unit tangent to a rate per s.
+
+        The values are those ``beyond`` before the state, where its plane is.
+        """
+        values = self.values(level, at)
+        gamma_rate = speed * at.tangent.load
+        moment_rate = speed * self.pieces[level].moment(at.moment_rate)
+        rates = (gamma_rate, moment_rate, 4.0 * values[MOMENT] * gamma_rate)
+        return [v - beyond * r for v, r in zip(values, rates, strict=True)] + list(rates)
+
+    def near(self, base: Equilibrium, s: float, here: Restricted | None = None) -> Matched | None:
+        """The matched states at the distance ``s`` along the path of the finest mesh.
+
+        ``here`` : those of the coarser meshes at ``base``, or near it, to start from.
+        """
+        at = self.beside(base, s)
+        return None if at is None else self.matched(at, here)
+
+    def beside(self, base: Equilibrium, s: float) -> Equilibrium | None:
+        """The state on the finest mesh at the distance ``s`` from another; None without one."""
+        piece, t = self.pieces[0], base.tangent
+        at = equilibrium(
+            piece.body,
+            piece.held,
+            moved(piece.held, base.state, Direction(s * t.q, s * t.force, s * t.load)),
+            along=t,
+            control=Control.DIRECTION,
+            tolerance=self.tolerance,
+        )
+        return at if at.converged else None
+
+
+def romberg(levels: Array) -> Array:
+    """Values at h, the same less their h^2 term, and less their h^4 term: (3, ...) as ``levels``.
+
+    Parameters
+    ----------
+    levels : (3, ...) values at h, 2h and 4h, with errors in even powers of h.
+    """
+    extrapolated: Array = _ROMBERG @ levels
+    return extrapolated
+
+
+@dataclass(frozen=True)
+class Place:
+    """A state of the extrapolated curve, and how an error of the curve moves it.
+
+    Notes
+    -----
+    What is sought is F(s) = 0, F a column of the table less a constant. If the curve is off by
+    c(s), the root is off by ds = -c_F/F', and the values there by c + rates ds.
+    """
+
+    s: float  # distance from the visit along the path
+    table: Array  # (LEVELS, 6)
+    residual: float
+    values: Array  # (3,) gamma, M, U
+    spread: Array  # (3, 6) error of values = spread . correction of the table's columns
+    bend: Array  # (LEVELS, 3) d rates/ds; zero where the state did not have to be sought
+    fixed: bool  # whether the place on the path means something
+    sought: bool = True  # whether it is a place of the extrapolated curve; else of N edges
+
+
+class Goal(NamedTuple):
+    """What is sought on the extrapolated curve."""
+
+    column: int  # of the table
+    value: float
+    direction: float  # where gamma is sought: sign of dgamma/ds on this side of a fold
+
+
+def _goal(visit: Visit, asked: Collection[float]) -> Goal | None:
+    """What a visited state stands for; None: for nothing but a place on the curve."""
+    load = visit.at.state.load
+    if visit.sought is not None:
+        return Goal(GAMMA, *visit.sought)
+    if visit.kind == "fold":
+        return Goal(RATE + GAMMA, 0.0, 0.0)
+    if visit.kind == "limit":
+        return Goal(RATE + MOMENT, 0.0, 0.0)
+    if visit.kind == "" and load in asked:
+        return Goal(GAMMA, load, visit.at.tangent.load)
+    return None
+
+
+def placed(
+    family: Family, visits: Sequence[Visit], asked: Collection[float]
+) -> Iterator[Place | None]:
+    """Where visited states belong on the extrapolated curve; None where a level has no state."""
+    near = None
+    for visit in visits:
+        here = family.matched(visit.at, near)
+        yield None if here is None else _placed(family, visit, here, asked)
+        near = None if here is None else here.coarse
+
+
+def _placed(family: Family, visit: Visit, here: Matched, asked: Collection[float]) -> Place | None:
+    """Where a visited state belongs, ``here`` being matched to it."""
+    goal = _goal(visit, asked)
+    if goal is not None:
+        return _sought(family, visit.at, here, goal)
+    values, bend = romberg(here.table)[-1][:RATE], np.zeros((LEVELS, RATE))
+    marked = visit.kind != ""
+    return Place(0.0, here.table, here.residual, values, np.eye(RATE, 6), bend, marked, not marked)
+
+
+def _sought(family: Family, base: Equilibrium, here: Matched, goal: Goal) -> Place | None:
+    """Where the goal is, by the secant method from ``base``, to which ``here`` is matched."""
+    s, now, bend = 0.0, romberg(here.table)[-1], np.zeros((LEVELS, RATE))
+    slope = float(now[RATE + goal.column]) if goal.column < RATE else 0.0
+    for _ in range(_MOST):
+        step = (goal.value - float(now[goal.column])) / slope if slope else _PROBE
+        if slope and abs(step) <= _SMALL:
+            return _found(goal, s + step, _advanced(here, step, bend), slope, bend)
+        s += step
+        new = family.near(base, s, here.coarse) if abs(s) < FARTHEST else None
+        if new is None:
+            return None
+        bend = (new.table[:, RATE:] - here.table[:, RATE:]) / step
+        after = romberg(new.table)[-1]
+        slope = float(after[goal.column] - now[goal.column]) / step
+        here, now = new, after
+    return None
+
+
+def _advanced(here: Matched, step: float, bend: Array) -> Matched:
+    """Matched states one small ``step`` further, where the rates change by ``bend`` per s."""
+    table = here.table.copy()
+    table[:, :RATE] += step * table[:, RATE:]
+    table[:, RATE:] += step * bend
+    return here._replace(table=table)
+
+
+def _found(goal: Goal, s: float, here: Matched, slope: float, bend: Array) -> Place | None:
+    """The place of a goal; None for a gamma that lies beyond a fold of the extrapolated curve.
+
+    ``slope`` is the rate of what is sought along s.
+    """
+    line, spread = romberg(here.table)[-1], np.eye(RATE, 6)
+    if goal.column == GAMMA:
+        slope = float(line[RATE])
+        if slope * goal.direction <= 0.0:
+            return None
+        line[GAMMA] = goal.value
+    spread[:, goal.column] -= line[RATE:] / slope
+    if goal.column == GAMMA:
+        spread[GAMMA] = 0.0  # given, to the last digit
+    return Place(s, here.table, here.residual, line[:RATE], spread, bend, fixed=True)

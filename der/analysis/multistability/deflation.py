@@ -1,0 +1,134 @@
+r"""Deflated Newton's method: from one start to state after state.
+
+Newton's method finds the same equilibrium again and again. Deflation (Brown and Gearhart 1971;
+Farrell, Birkisson and Funke 2015) multiplies the residual F by a number that is infinite at every
+state y_k already known and tends to a constant far from all of them,
+
+    G(x) = eta(x) F(x),    eta = prod_k (1/d(x, y_k)^2 + 1).
+
+G has the roots of F but those known. Its Jacobian is that of F, eta J, plus a matrix of rank one,
+so that with Newton's own step D = -J^-1 F its step is (Sherman and Morrison; Farrell et al. 2.4)
+
+    tau D,    tau = 1/(1 - slope),    slope = d(log eta)/dt along D,
+
+and needs nothing but a number, the slope, beyond the factors at hand. Near a state that is not
+known D is small, tau is 1 and convergence quadratic; near a known one slope is 2 and tau -1: the
+iteration is thrown back. The distance d is that of `states_images`, which no rigid motion, mirror
+or material shift changes: so a state is deflated together with all its images. The slope is a
+difference, as its error changes the way and not where it leads to.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from der.analysis.landscape.saddle_search import displaced, newton_step
+from der.analysis.multistability.symmetry_images import SAME, Images, Signal, curvatures
+from der.kernels.quaternions import Array
+from der.rod.equilibrium import Direction, equilibrium, moved
+from der.rod.free_ring import Alone, balance
+
+LONGEST = 0.25  # rad, root mean square, of a step
+TOLERANCE = 1e-10  # GJ/a, of an equilibrium
+_STEPS = 60
+_NEARLY = 1e-5  # GJ/a, largest force: Newton's method takes over
+_NEARLY_RIGID = 0.01  # of a shift: how much more than a rigid rotation it is, beside a circle
+_SHORT = 1e-4  # rad, root mean square: a step below is Newton's own, tau = 1
+_PART = 1e-3  # of a step, over which its slope is taken
+_NO_DISTANCE = 1e-12
+
+
+@dataclass(frozen=True)
+class Known:
+    """A state that was found."""
+
+    alone: Alone
+    images: Signal  # (m, h, 3) signatures of all its images, its own first
+    energy: float
+
+
+def factor(distances: Callable[[float], Array], *, power: float = 2.0, shift: float = 1.0) -> float:
+    """By how much deflation lengthens Newton's step.
+
+    Parameters
+    ----------
+    distances : of the states that are known, as a function of how much of the step is done.
+    power, shift : of eta = prod (1/d^power + shift).
+    """
+
+    def log_eta(t: float) -> float:
+        return float(np.sum(np.log(np.maximum(distances(t), _NO_DISTANCE) ** -power + shift)))
+
+    slope = (log_eta(_PART) - log_eta(0.0)) / _PART
+    return math.inf if slope == 1.0 else 1.0 / (1.0 - slope)
+
+
+def deflated(start: Alone, known: Sequence[Known], images: Images) -> Known | None:
+    """A state that is not among the known ones, from a configuration; None where none is met."""
+    here = start
+    for _ in range(_STEPS):
+        if not math.isfinite(here.residual):
+            return None
+        found = newton_step(here.body, here.pinned(), here.state)
+        if found is None:
+            return None
+        step, grad = found
+        if float(np.abs(grad).max()) < _NEARLY:
+            return settled(here, known, images)
+        size = float(np.sqrt(np.sum(here.body.mass * step**2)))
+        tau = _lengthened(here, step, known, images) if size > _SHORT else 1.0
+        tau = math.copysign(min(abs(tau), LONGEST / max(size, 1e-300)), tau)
+        here = displaced(here, tau * step)
+    return None
+
+
+def _lengthened(here: Alone, step: Array, known: Sequence[Known], images: Images) -> float:
+    """Factor of the step at a configuration."""
+    nothing = np.zeros(len(here.held.target))
+
+    def distances(t: float) -> Array:
+        state = moved(here.held, here.state, Direction(t * step, nothing, 0.0))
+        return nearest(images.signature(curvatures(here.body, state)), known, images)
+
+    return factor(distances) if known else 1.0
+
+
+def nearest(k: Signal, known: Sequence[Known], images: Images) -> Array:
+    """Distances (len(known),) of one signature from the nearest image of each known state."""
+    sizes = [len(one.images) for one in known]
+    apart = images.distances(k, np.concatenate([one.images for one in known]))
+    return np.minimum.reduceat(apart, np.cumsum([0, *sizes[:-1]]))
+
+
+def settled(here: Alone, known: Sequence[Known], images: Images) -> Known | None:
+    """The equilibrium next to a configuration; None where there is none, or it is known."""
+    one = solved(here, images)
+    return None if one is None or recognised(one, known, images) is not None else one
+
+
+def solved(here: Alone, images: Images) -> Known | None:
+    """The equilibrium next to a configuration, verified with all that its supports leave free.
+
+    Beside a planar circle material shifts at next to no cost, in it that is a rigid rotation and no
+    motion of its own: what is held against it then stands in the way, so both are tried.
+    """
+    for held in (here.pinned(), here.pinned(_NEARLY_RIGID)):
+        at = equilibrium(here.body, held, here.state, tolerance=TOLERANCE)
+        state = at.state
+        alone = balance(here.body, state.quat, state.stretch, here.held, state.load)
+        if at.converged and alone.balanced:
+            return Known(alone, images.all_of(curvatures(here.body, state)), at.energy)
+    return None
+
+
+def recognised(one: Known, known: Sequence[Known], images: Images) -> int | None:
+    """Which of the known states it is, or an image of; None: none of them."""
+    if not known:
+        return None
+    apart = nearest(one.images[0], known, images)
+    best = int(np.argmin(apart))
+    return best if apart[best] < SAME else None

@@ -1,0 +1,126 @@
+r"""Where the search for states begins: shapes that are states of some ring, and those of twisting.
+
+A planar closed elastica is a circle, covered n times, or a figure eight (Euler 1744; Langer and
+Singer 1984), and natural curvature kappa0, uniform along the ring, changes nothing about that: in
+alpha (k - kappa0)^2/2 the cross term integrates to the turning number and the rest is a constant.
+In space the bar may be rolled about its own tangent by phi, k = n (cos phi, sin phi, 0), where
+
+    U'(phi) = 0:    sin phi = 0    or    cos phi = -alpha kappa0/((beta - alpha) n),
+
+the second being the tilted ring between a circle and the same turned inside out, its pass where
+beta > alpha. It exists while alpha |kappa0| < |beta - alpha| n, and where it ends, the circle
+flips: alpha (n - kappa0) = beta n, or the same with -n.
+
+On other rings all this is a first guess.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from der.analysis.landscape.barrier import twisted_rests
+from der.analysis.landscape.landscape import FARTHEST, scene_sector
+from der.analysis.landscape.saddle_search import displaced
+from der.continuation.arclength import follow
+from der.continuation.events import Wanted
+from der.continuation.step import Stuck, Tally, root
+from der.kernels.quaternions import Array, turned
+from der.rod.free_ring import Alone, balance, left_alone
+from der.rod.gripped_ring import Sector
+from der.scene import Scene
+
+_AS_IS = np.ones(4)
+_MIRRORED = np.array([1.0, 1.0, -1.0, -1.0])  # quaternions, across the plane of the flat ring
+_COVERED = 3  # times, or as often as the bar would like to
+_EDGES_A_COVER = 4  # at least
+
+
+def free_starts(scene: Scene, whole: Sector) -> Iterator[Alone]:
+    """Shapes of a ring without grips, the flat ring first."""
+    wanted = math.ceil(abs(scene.ring.natural_ratio))
+    most = min(max(_COVERED, wanted), scene.n_edges // _EDGES_A_COVER)
+    for turns in range(1, most + 1):
+        yield covered(whole, turns)
+    yield eight(whole)
+    for turns in range(1, _COVERED + 1):
+        yield covered(whole, turns, math.pi)
+    for turns in range(1, _COVERED + 1):
+        tilt = _tilt(scene, turns)
+        if tilt is not None:
+            yield covered(whole, turns, tilt)
+    yield eight(whole, 0.5 * math.pi)
+    yield from twisted_rests(scene)[1]
+
+
+def gripped_starts(scene: Scene, whole: Sector, gamma: float) -> Iterator[Alone]:
+    """States on the path of twisting at a rotation of the grips, stable and unstable ones.
+
+    And the mirror images of those at 2 pi - gamma: grips turned by -(2 pi - gamma) are where they
+    are when turned by gamma.
+    """
+    piece = scene_sector(scene, scene.sector)
+    other = 2.0 * math.pi - gamma
+    wanted = Wanted(
+        load_max=FARTHEST,
+        until_folded=max(gamma, other) <= math.pi,
+        targets=(gamma, other),
+        stability=False,
+        contacts=False,
+        tolerance=scene.tolerance,
+        most_steps=600,
+    )
+    try:
+        for one in follow(piece, wanted, Tally()):
+            state = one.at.state
+            for load, signs in ((gamma, _AS_IS), (other, _MIRRORED)):
+                if state.load == load:
+                    alone = left_alone(piece, whole, state)
+                    quat, stretch = alone.state.quat * signs, alone.state.stretch
+                    yield balance(whole.body, quat, stretch, whole.held, gamma)
+    except Stuck:  # what was found on the way counts
+        return
+
+
+def covered(whole: Sector, turns: int, roll: float = 0.0) -> Alone:
+    """The ring wound ``turns`` times, planar, its bar rolled about its tangent [rad]."""
+    s = whole.arc_length
+    return _bent(whole, (turns - 1) * 2.0 * math.pi * s / whole.body.cell.sum(), roll)
+
+
+def eight(whole: Sector, roll: float = 0.0) -> Alone:
+    """The ring as a planar figure eight.
+
+    Notes
+    -----
+    The tangent's angle theta of an inflectional elastica is sin(theta/2) = k sn(u), one period of
+    4 K(k) to the ring's length; it closes where 2 E(k) = K(k) (Love 1927, 263).
+    """
+    from scipy.special import ellipe, ellipj, ellipk
+
+    m = root(lambda m: float(2.0 * ellipe(m) - ellipk(m)), 0.5, 0.95)
+    share = whole.arc_length / whole.body.cell.sum()
+    theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * share, m)[0])
+    return _bent(whole, theta - 2.0 * math.pi * share, roll)
+
+
+def _bent(whole: Sector, more: Array, roll: float) -> Alone:
+    """The flat ring with its tangents turned in its plane by ``more`` [rad], closed again."""
+    quat = np.empty_like(whole.start.quat)
+    for j, (flat, angle) in enumerate(zip(whole.start.quat, more, strict=True)):
+        turned(flat, np.array([angle, 0.0, 0.0]), quat[j])  # d1 is the plane's normal
+        turned(quat[j], np.array([0.0, 0.0, roll]), quat[j])
+    alone = balance(whole.body, quat, np.zeros(len(more)))
+    return displaced(alone, np.zeros(alone.held.free.shape))
+
+
+def _tilt(scene: Scene, turns: int) -> float | None:
+    """Roll of the tilted circle [rad]; None where there is none."""
+    alpha, beta = scene.section.alpha, scene.section.beta
+    if alpha == beta:
+        return None
+    natural = scene.ring.natural_ratio * 2.0 * math.pi / scene.ring.length
+    cosine = -alpha * natural / ((beta - alpha) * turns)
+    return math.acos(cosine) if abs(cosine) < 1.0 else None

@@ -1,0 +1,89 @@
+"""Where a state falls to when it is pushed along its ways down.
+
+The ring flows down its energy (`gradient_flow`) from a nudge along each mode of negative stiffness,
+to either side, and Newton's method finishes. A nudge keeps the symmetry of its mode, and so does
+the flow, which then may come to rest on a saddle that is a minimum among symmetric shapes only; it
+is noted, and the ring nudged on along the steepest way down from there, until nothing leads down.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from der.analysis.multistability.deflation import Known, solved
+from der.analysis.multistability.symmetry_images import Images
+from der.kernels.quaternions import Array
+from der.rod.equilibrium import Direction
+from der.rod.free_ring import Alone, balance
+from der.rod.gradient_flow import flow
+from der.rod.stability import all_modes, softest_modes
+
+_NUDGE = 0.03  # rad, root mean square
+_TOLERANCE = 1e-6  # GJ/a, of the flow; Newton's method goes on
+_MOST_MODES = 24  # looked at: nearest to zero come first, so steep ones ask for more
+_MOST_SADDLES = 6  # passed on one fall; each has fewer ways down than the one before
+_MOST_STEPS = 2000  # of a flow; most take below 200
+
+
+@dataclass(frozen=True)
+class Fallen:
+    """One push and what it led to."""
+
+    stiffness: float  # of the mode pushed along
+    sign: int
+    rests: tuple[Known, ...]  # states in which the ring came to rest, the last a minimum
+    ended: bool  # whether there is such a last one
+
+
+def ways_down(one: Alone, index: int) -> tuple[Array, Array]:
+    """Eigenvalues (m,) and modes (m, n, b) of negative stiffness, the steepest first."""
+    held = one.pinned()
+    negative = np.zeros(0, dtype=int)
+    count = index + 2
+    while True:
+        values, modes = softest_modes(one.body, held, all_modes(held), one.state, count)
+        negative = np.argsort(values)[: int(np.sum(values < 0.0))]
+        if len(negative) >= index or count >= _MOST_MODES:
+            return values[negative], modes[negative]
+        count = min(2 * count, _MOST_MODES)
+
+
+def falls(one: Known, index: int, images: Images) -> Iterator[Fallen]:
+    """What pushes along all ways down lead to, to either side of each."""
+    values, modes = ways_down(one.alone, index)
+    for value, mode in zip(values, modes, strict=True):
+        for sign in (1, -1):
+            yield _fall(one, float(value), sign, mode, images)
+
+
+def _fall(one: Known, stiffness: float, sign: int, mode: Array, images: Images) -> Fallen:
+    rests: list[Known] = []
+    here = one
+    push = sign * mode
+    while len(rests) < _MOST_SADDLES:
+        landed = _landed(here.alone, push, images)
+        if landed is None or landed.energy >= here.energy:
+            return Fallen(stiffness, sign, tuple(rests), ended=False)
+        rests.append(landed)
+        index = landed.alone.index()
+        if index == 0:
+            return Fallen(stiffness, sign, tuple(rests), ended=True)
+        if index is None:
+            break
+        push, here = ways_down(landed.alone, index)[1][0], landed
+    return Fallen(stiffness, sign, tuple(rests), ended=False)
+
+
+def _landed(here: Alone, push: Array, images: Images) -> Known | None:
+    """The equilibrium in which the flow from a push ends; None where it does not."""
+    size = _NUDGE * math.sqrt(float(here.body.length.sum()))
+    kick = Direction(size * push, np.zeros(len(here.held.target)), 0.0)
+    fall = flow(here.body, here.held, here.state, kick=kick, tolerance=_TOLERANCE, most=_MOST_STEPS)
+    if not fall.rests:
+        return None
+    state = fall.state
+    return solved(balance(here.body, state.quat, state.stretch, here.held, state.load), images)

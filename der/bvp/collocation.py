@@ -1,0 +1,171 @@
+"""Solutions of a sector's boundary-value problem: solved for, moved between meshes, judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from der.bvp.corrector import CONVERGED, DIVERGED, SINGULAR, SLOW, correct
+from der.bvp.gauss import Array, Rule, rule
+from der.bvp.meshes import Mesh, first_mesh, moved_to
+from der.bvp.sectors import Sector
+
+ADVICE = {
+    DIVERGED: "Newton's method diverges",
+    SLOW: "Newton's method does not converge",
+    SINGULAR: "the collocation equations are singular",
+}
+CLOSE = 1e-9  # last increment; rates and places are those before it
+
+
+class Direction(NamedTuple):
+    """A change of a solution: of frames at the stages, constants p and gamma."""
+
+    frames: Array  # (n, m, 4)
+    p: Array  # (n_p,)
+    gamma: float
+
+
+class Solution(NamedTuple):
+    """An equilibrium and the path's tangent there, of unit length."""
+
+    mesh: Mesh
+    frames: Array  # (n, m, 4) at the stages
+    p: Array  # (n_p,) see `sectors`
+    gamma: float
+    moment: float  # M of one arm, GJ/a
+    energy: float  # U of the full ring, GJ/a
+    tangent: Direction
+    moment_rate: float  # dM along the tangent
+    orientation: int  # sign of the determinant, the same all along a path
+    nodes: Array  # (n + 1, 4) frames and
+    places: Array  # (n + 1, 3) positions less the first, at the mesh points
+    iterations: int
+
+    @property
+    def slope(self) -> float:
+        """dM/dgamma, from the linearised problem."""
+        return self.moment_rate / self.tangent.gamma
+
+
+class Failure(NamedTuple):
+    """No solution, and why."""
+
+    outcome: int
+    iterations: int
+
+    @property
+    def reason(self) -> str:
+        """In words."""
+        return ADVICE[self.outcome]
+
+
+class Error(NamedTuple):
+    """What a solution changes by on a mesh of half the intervals' length."""
+
+    gamma: float
+    moment: float
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class Collocation:
+    """The collocation equations of a sector."""
+
+    sector: Sector
+    rule: Rule
+
+    def solved(
+        self,
+        mesh: Mesh,
+        guess: Direction,
+        along: Direction,
+        *,
+        by_gamma: bool = False,
+        iterations: int = 12,
+        tolerance: float = CLOSE,
+    ) -> Solution | Failure:
+        """The solution beside ``guess``: at its gamma, or in the plane across ``along``."""
+        piece = self.sector.piece
+        frames, p = guess.frames.copy(), guess.p.copy()
+        n, m = mesh.rest.shape
+        nodes, places = np.empty((n + 1, 4)), np.empty((n + 1, 3))
+        tangent, tangent_p = np.empty((n, m, 4)), np.empty(len(p))
+        status, done, gamma, tangent_gamma, rate, orientation, moment, energy = correct(
+            *piece,
+            mesh.h,
+            mesh.rest,
+            frames,
+            p,
+            guess.gamma,
+            along.frames,
+            along.gamma,
+            by_gamma,
+            iterations,
+            tolerance,
+            nodes,
+            places,
+            tangent,
+            tangent_p,
+        )
+        if status != CONVERGED and not (status == SLOW and tolerance == 0.0):
+            return Failure(status, done)
+        return Solution(
+            mesh,
+            frames,
+            p,
+            gamma,
+            moment,
+            self.sector.copies * energy,
+            Direction(tangent, tangent_p, tangent_gamma),
+            rate,
+            orientation,
+            nodes,
+            places,
+            done,
+        )
+
+    def flat(self, n: int) -> Solution | Failure:
+        """The flat ring on about n intervals, the tangent towards larger gamma."""
+        mesh = first_mesh(self.sector, self.rule, n)
+        guess = Direction(self.sector.flat(mesh.stages), self.sector.flat_constants(), 0.0)
+        along = Direction(np.zeros_like(guess.frames), np.zeros_like(guess.p), 1.0)
+        return self.solved(mesh, guess, along, by_gamma=True)
+
+    def on(self, mesh: Mesh, at: Solution) -> Solution | Failure:
+        """The same solution on another mesh."""
+        frames = moved_to(at.mesh, at.nodes[:-1], at.frames, mesh.stages)
+        t = at.tangent
+        along = Direction(moved_to(at.mesh, None, t.frames, mesh.stages), t.p, t.gamma)
+        return self.solved(mesh, Direction(frames, at.p, at.gamma), along)
+
+    def error(self, at: Solution) -> Error:
+        """Change of (gamma, M, U) across the path by one iteration on halved intervals.
+
+        The polynomials are accurate to h^(m+1) between the mesh points, so one iteration leaves the
+        square of that: the change is the discretisation error of the coarse solution, h^(2m), to
+        1 part in 2^(2m).
+        """
+        fine = at.mesh.halved
+        n, m = at.mesh.rest.shape
+
+        shape = (2 * n, m, 4)
+        values = np.concatenate([at.nodes[:-1, None], at.frames], axis=1)
+        guess = Direction((self.rule.halves @ values).reshape(shape), at.p, at.gamma)
+        t = at.tangent
+        along = Direction((self.rule.halves_inner @ t.frames).reshape(shape), t.p, t.gamma)
+        found = self.solved(fine, guess, along, iterations=1, tolerance=0.0)
+        if isinstance(found, Failure):
+            return Error(np.inf, np.inf, np.inf)
+        return Error(
+            abs(found.gamma - at.gamma),
+            abs(found.moment - at.moment),
+            abs(found.energy - at.energy),
+        )
+
+
+def collocation(sector: Sector) -> Collocation:
+    """The collocation equations of a sector."""
+    return Collocation(sector, rule())

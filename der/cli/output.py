@@ -1,0 +1,272 @@
+"""Where the command's answers go: files, checked before the work is done, and standard output."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Protocol, TypeAlias
+
+if TYPE_CHECKING:
+    from der.records.path import Path
+    from der.utils.files import FilePath
+
+UNSAVED = File("der-unfinished.json")  # where what is unfinished goes if no file was named
+OUTPUT = File("-")  # standard output
+DRAWN = ("plot", "rrd", "html", "movie")  # the quick ones first
+
+Targets: TypeAlias = dict[str, list[File]]  # by option, that of --out first
+Writers: TypeAlias = Mapping[str, Callable[[File], object] | str]  # or why there is nothing to draw
+
+
+class Record(Protocol):
+    """What every answer can do."""
+
+    def save(self, path: FilePath) -> None:
+        """Write JSON."""
+
+    def to_json(self) -> str:
+        """JSON text."""
+
+
+def say(line: str) -> None:
+    """Print on standard error."""
+    print(line, file=sys.stderr)
+
+
+def show(text: str) -> bool:
+    """Print on standard output; False, in words, where it takes no more."""
+    try:
+        print(text, flush=True)
+    except OSError as wrong:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush
+        if isinstance(wrong, BrokenPipeError):
+            return True  # whoever read our output has had enough
+        say(f"der: could not write to standard output: {wrong.strerror}")
+        return False
+    return True
+
+
+# --- Before the work -------------------------------------------------------------------------
+
+
+def check_named(**given: str | None) -> None:
+    """Raise ValueError where the next option was taken for a file's name."""
+    for name, value in given.items():
+        if value is not None and value.startswith("-") and (name, value) != ("json", "-"):
+            raise ValueError(f"{name} must be a file name, got {value!r}")
+
+
+def targets(
+    json: str | None,
+    plot: str | None,
+    rrd: str | None,
+    out: str | None,
+    *,
+    movie: str | None = None,
+    html: str | None = None,
+    stem: str = "path",
+    shapes: bool = True,
+) -> Targets:
+    """The files to write, after making sure that they can be written.
+
+    A folder gets all of its own, whatever else is named.
+    """
+    check_named(json=json, plot=plot, rrd=rrd, out=out, movie=movie, html=html)
+    files: Targets = {}
+    if out is not None:
+        folder = File(out)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as wrong:
+            raise ValueError(f"out must be a folder, got {out!r}: {wrong.strerror}") from None
+        files = {"json": [folder / f"{stem}.json"], "plot": [folder / f"{stem}.png"]}
+        if shapes:
+            files["shapes"] = [folder / "shapes.npz"]
+    if plot is not None:
+        from der.viz.plots.style import FORMATS
+
+        if File(plot).suffix not in FORMATS:
+            raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
+    if rrd is not None and File(rrd).suffix != ".rrd":
+        raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
+    if movie is not None:
+        from der.viz.movie import check_movie
+
+        check_movie(movie)
+    if html is not None:
+        from der.viz.html import check_html
+
+        check_html(html)
+    named = {"json": json, "plot": plot, "rrd": rrd, "movie": movie, "html": html}
+    for name, given in named.items():
+        if given is not None and File(given) not in files.setdefault(name, []):
+            files[name].append(File(given))
+    others = [file for name, some in files.items() if name != "json" for file in some]
+    for file in files.get("json", []):
+        if file in others:
+            raise ValueError(f"json must be a file of its own, got {str(file)!r} twice")
+    for name, some in files.items():
+        for file in some:
+            if file != OUTPUT:
+                check_writable(name if name != "shapes" else "out", file)
+    return files
+
+
+def check_writable(name: str, file: File) -> None:
+    """Raise ValueError where ``file`` cannot be written, before hours are spent on it."""
+    if file.is_dir():
+        raise ValueError(f"{name} must be a file, got the folder {str(file)!r}")
+    if file.exists() and not file.is_file():  # it would be replaced by a file: /dev/null!
+        raise ValueError(f"{name} must be a regular file, got {str(file)!r}")
+    try:
+        with tempfile.TemporaryFile(dir=file.parent):
+            pass
+    except OSError as wrong:
+        raise ValueError(
+            f"{name} must be a file in a folder that can be written to, got {str(file)!r}: "
+            f"{wrong.strerror}"
+        ) from None
+
+
+def kept(folder: str) -> Path:
+    """The path that an earlier command has kept in its --out folder, with its shapes.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or none with shapes.
+    """
+    from dataclasses import replace
+
+    from der.records.configurations import Shapes
+    from der.records.path import Path
+
+    check_named(beside=folder)
+    try:
+        path = Path.load(File(folder) / "path.json")
+        path = replace(path, shapes=Shapes.load(File(folder) / "shapes.npz"))
+    except OSError as wrong:
+        raise ValueError(
+            f"beside must be a folder with path.json and shapes.npz, as --out writes, "
+            f"got {folder!r}: {wrong.strerror}"
+        ) from None
+    except ValueError as wrong:
+        raise ValueError(
+            f"beside must be a folder as --out writes, got {folder!r}: {wrong}"
+        ) from None
+    if len(path) < 2:
+        raise ValueError(f"beside must hold a path of two states at least, got {folder!r}")
+    return path
+
+
+# --- After it --------------------------------------------------------------------------------
+
+
+def keep_somewhere(targets: Targets) -> None:
+    """Name files for the record and its shapes where there are none: what is found is kept."""
+    file = targets.setdefault("json", [UNSAVED])[-1]
+    targets.setdefault("shapes", [(UNSAVED if file == OUTPUT else file).with_suffix(".npz")])
+
+
+def places(targets: Targets, *, shapes: bool = False) -> str:
+    """Where the record is, and the shapes."""
+    words = ["on standard output" if file == OUTPUT else f"in {file}" for file in targets["json"]]
+    where = " and ".join(words)
+    return f"{where}, shapes in {_listed(targets['shapes'])}" if shapes else where
+
+
+def whereabouts(path: Path, targets: Targets) -> str:
+    """Where an unfinished path went, and how far it got."""
+    if not len(path):
+        return f"the record, without any state, is {places(targets)}"
+    last = f"at gamma = {path.gamma[-1]:.8g}"
+    return (
+        f"the path up to its last good state, {last}, is {places(targets)}, "
+        f"its shapes in {_listed(targets['shapes'])}"
+    )
+
+
+def deliver(record: Record, targets: Targets, writers: Writers) -> int:
+    """Write the record first, then what is drawn of it; say what could not be; the exit code.
+
+    A record that can be written nowhere goes to standard output, also in ``targets``, and one that
+    nobody wanted is kept where Ctrl-C stops the drawing: nothing already computed is lost.
+    """
+    from der.utils.interrupts import interrupts_between_states
+
+    with interrupts_between_states() as pressed:
+        done = _keep(record, targets, writers)
+    missing = [(name, file) for name in DRAWN for file in targets.get(name, ())]
+    drawn: list[File] = []
+    while missing and not pressed:
+        name, file = missing[0]
+        writer = writers[name]
+        try:
+            if isinstance(writer, str):
+                say(f"der: {file} was not drawn: {writer}")
+            else:
+                writer(file)
+                drawn.append(file)
+        except KeyboardInterrupt:
+            pressed.append(1)
+        except (OSError, ValueError) as wrong:
+            if _stopped(wrong):
+                pressed.append(1)
+            else:
+                say(f"der: could not write {file}: {wrong}")
+                done = False
+        if not pressed:
+            del missing[0]
+    if not missing:
+        return 0 if done else 3
+    with interrupts_between_states():
+        if "json" not in targets:
+            keep_somewhere(targets)
+            _keep(record, targets, writers)
+    also = f"; written: {_listed(drawn)}" if drawn else ""
+    lost = _listed(file for _, file in missing)
+    say(f"der: stopped by the user; the record is {places(targets)}{also}; not written: {lost}")
+    return 130
+
+
+def _keep(record: Record, targets: Targets, writers: Writers) -> bool:
+    """Write the record and its shapes."""
+    done = True
+    good: list[File] = []
+    for file in targets.get("json", ()):
+        try:
+            if file != OUTPUT:
+                record.save(file)
+            good.append(file)
+        except (OSError, ValueError) as wrong:
+            done = False
+            say(f"der: could not write {file}: {wrong}")
+    if "json" in targets:
+        targets["json"] = good or [OUTPUT]
+        if OUTPUT in targets["json"]:
+            done = show(record.to_json().rstrip()) and done
+    writer = writers.get("shapes")
+    for file in targets.get("shapes", ()):
+        try:
+            if callable(writer):
+                writer(file)
+        except (OSError, ValueError) as wrong:
+            done = False
+            say(f"der: could not write {file}: {wrong}")
+    return done
+
+
+def _stopped(wrong: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: it also stops programs that draw for us."""
+    while wrong is not None:
+        if isinstance(wrong, KeyboardInterrupt):
+            return True
+        wrong = wrong.__context__
+    return False
+
+
+def _listed(files: Iterable[File]) -> str:
+    return ", ".join(str(file) for file in files)

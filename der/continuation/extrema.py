@@ -1,0 +1,130 @@
+"""Where a value turns within a step of a path: folds of the load, limits of the moment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import TypeAlias
+
+from der.continuation.bifurcations import SAME
+from der.continuation.step import ROOT, Step
+from der.rod.equilibrium import Equilibrium
+
+_AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way
+_ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
+_HALVED = 0.25  # of what it was wrong by: on a part of the interval
+
+Found: TypeAlias = tuple[float, Equilibrium]  # a place, and the state there
+Value: TypeAlias = Callable[[Equilibrium], tuple[float, float]]  # and its rate along the path
+
+
+def of_load(at: Equilibrium) -> tuple[float, float]:
+    """The load, and its rate along the path."""
+    return at.state.load, at.tangent.load
+
+
+def of_moment(at: Equilibrium) -> tuple[float, float]:
+    """The moment, and its rate along the path."""
+    return at.moment, at.moment_rate
+
+
+def turns(
+    step: Step, low: Found, high: Found, value: Value, along: Value | None = None
+) -> list[Found]:
+    """Places between two, and their states, where a value turns back.
+
+    Parameters
+    ----------
+    along : the same value and its rate by s, where that differs from the rate along the path.
+    """
+    places = _looked_at(step, low, high, along or value)
+    return [
+        _turn(step, a, b, value)
+        for a, b in pairwise(_cut(step, places, value))
+        if value(a[1])[1] * value(b[1])[1] < 0.0
+    ]
+
+
+def _turn(step: Step, low: Found, high: Found, value: Value) -> Found:
+    """The place between two, and its state, where a ``value`` turns: its rate changes sign."""
+    (s, a), (t, b) = low, high
+    (first, rate), (last, other) = value(a), value(b)
+    c1, c2, c3 = _cubic(t - s, last - first, rate, other)
+    # the root of c1 + 2 c2 u + 3 c3 u^2 between 0 and 1, where that changes its sign
+    u = -c1 / (c2 + math.copysign(math.sqrt(max(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
+    if not 0.0 < u < 1.0 and c3 != 0.0 and u != 0.0:
+        u = c1 / (3.0 * c3 * u)
+    guess = s + u * (t - s) if 0.0 < u < 1.0 else None
+    return step.change(lambda at: value(at)[1], low, high, guess)
+
+
+def _cubic(length: float, jump: float, first: float, last: float) -> tuple[float, float, float]:
+    """Coefficients of u, u^2, u^3 of the cubic by its rates at u = 0 and 1, over its ``length``."""
+    mean = jump / length
+    return first, 3.0 * mean - 2.0 * first - last, first + last - 2.0 * mean
+
+
+def _looked_at(
+    step: Step, low: Found, high: Found, value: Value, off: float | None = None
+) -> list[Found]:
+    """Two places, and those between that tell whether the rate of a value changes sign there.
+
+    Two turns that lie close together show at the ends of an interval only by the cubic between
+    them, whose rate is smallest in the middle. Where that says that they may be there, this place
+    is looked at, and the two halves again.
+
+    Parameters
+    ----------
+    off : by how much the rate of the cubic may be wrong; None: not known.
+    """
+    (s, a), (t, b) = low, high
+    (first, rate), (last, other) = value(a), value(b)
+    if rate * other <= 0.0 or t - s < SAME * step.length:
+        return [low, high]
+    _, c2, c3 = _cubic(t - s, last - first, rate, other)
+    u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
+    if not 0.0 < u < 1.0:
+        return [low, high]
+    expected = rate + (2.0 * c2 + 3.0 * c3 * u) * u
+    off = _ASLANT * abs(rate) if off is None else off
+    if math.copysign(1.0, rate) * expected >= off:
+        return [low, high]
+    place = s + u * (t - s)
+    middle = (place, step.at(place))
+    found = value(middle[1])[1]
+    if found * rate < 0.0:
+        return [low, middle, high]
+    # of third order in the length
+    off = _HALVED * abs(found - expected)
+    before = _looked_at(step, low, middle, value, off)
+    return [*before, *_looked_at(step, middle, high, value, off)[1:]]
+
+
+def _cut(step: Step, places: list[Found], value: Value) -> list[Found]:
+    """Places with one more wherever a value changes against its rates at two of them.
+
+    In between the rate has the other sign, on however short a way: by bisection. Where a ring is
+    stretched all but taut, M so leaps from one end of its range to the other.
+    """
+    cut = places[:1]
+    for low, high in pairwise(places):
+        end = high
+        while high[0] - low[0] > ROOT:
+            (first, rate), (last, other) = value(low[1]), value(high[1])
+            least = _AGAINST * max(abs(rate), abs(other)) * (high[0] - low[0])
+            if rate * other <= 0.0 or (last - first) * math.copysign(1.0, rate) >= -least:
+                break
+            s = 0.5 * (low[0] + high[0])
+            middle = (s, step.at(s))
+            between, turned = value(middle[1])
+            if turned * rate < 0.0:
+                cut.append(middle)
+                break
+            # it is against its rates on one of the halves at least
+            if (between - first) * rate < 0.0:
+                high = middle
+            else:
+                low = middle
+        cut.append(end)
+    return cut

@@ -1,0 +1,436 @@
+"""The boundaries between folding modes, as curves through a phase diagram.
+
+Wherever neighbouring cases of a scan differ, something happens between them. Five things are
+conditions that can be followed across the diagram (`conditions`, `tracing`): the folded state loses
+its stability; the fold at which the path turns back reaches gamma = pi; it merges there with its
+mirror image, in the folded state, whose slope is infinite then; two folds merge in a cusp; the path
+from the flat ring changes partners with another one ("exchange"): it leads elsewhere then, or
+leaves folds behind on a closed one. Where curves meet, the corner is solved for (`corners`). A
+curve is kept from corner to corner where the labels on its two sides, solved for, differ by what it
+bounds. What no condition explains is found by bisection of the label between two cases.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from der.bvp.gauss import Array
+from der.diagram.cases import Case, Row, solve_case
+from der.diagram.conditions import KINDS, Lost, Value, fresh, numbers, on
+from der.diagram.corners import FOLD, Line, Met, mark_corners
+from der.diagram.curve_pruning import (
+    BESIDE,
+    SAME_CURVE,
+    asked_beside,
+    beside,
+    pieces_of,
+    unlike,
+    where,
+)
+from der.diagram.curve_tracing import At, Function, States, corrected, trace
+from der.diagram.families import Family
+from der.diagram.infinite_slope import across, infinite_slope_near, is_half
+from der.diagram.label_changes import Crossing, Placed, crossings_of, differences, seeds
+from der.diagram.polylines import distance, loose_ends, meetings
+from der.diagram.scanned_boundaries import BoundaryPoint, Corner, Curve
+from der.scene import Scene
+
+NARROW = 1e-3  # of the side: cases so near to each other have the state that a condition needs
+NEAREST = 1e-4  # likewise, beside the end of another curve
+SHARPER = 8  # halvings between such points of a curve
+ROUNDS, ROUND = 3, 12  # of looking round such ends, and in how many places
+BISECTED = 1e-6  # of the diagram's side
+REACH = 3.0  # gaps of the scan within which a crossing must find its curve
+EXCHANGE = "exchange"
+INFINITE = "infinite slope"
+
+
+Solve = Callable[[Sequence[Case]], Sequence[Row]]  # cases -> their rows, in the same order
+
+
+def one_by_one(cases: Sequence[Case]) -> list[Row]:
+    """The rows of cases, solved in this process."""
+    return [solve_case(case) for case in cases]
+
+
+class Boundaries(NamedTuple):
+    """The boundaries of a diagram and their corners."""
+
+    curves: list[Curve]
+    corners: list[Corner]
+
+
+def boundaries(family: Family, rows: Sequence[Row], *, solve: Solve = one_by_one) -> Boundaries:
+    """Boundaries of a diagram from the rows of its scan; of a cube, slice by slice.
+
+    Parameters
+    ----------
+    solve : how the cases beside curves and between neighbours are solved, many at a time
+    """
+    parts = [_Diagram(part, solve).boundaries() for part in slices(family, rows)]
+    return joined(parts)
+
+
+def joined(parts: Iterable[Boundaries]) -> Boundaries:
+    """The boundaries of all slices."""
+    found = Boundaries([], [])
+    for part in parts:
+        found.curves.extend(part.curves)
+        found.corners.extend(part.corners)
+    return found
+
+
+class Slice(NamedTuple):
+    """A unit square of a family, and what a scan has found there."""
+
+    family: Family
+    sheet: str
+    plane: float | None  # second coordinate, of a cube
+    placed: Placed
+
+    def has(self, case: Case) -> bool:
+        """Whether a case lies in it."""
+        unit = self.family.unit(case)
+        if unit is None or (case.twist_axis != self.sheet and case.b_over_a != 1.0):
+            return False
+        return self.plane is None or abs(unit[1] - self.plane) < 1e-9
+
+
+def slice_boundaries(
+    part: Slice, known: Sequence[Row], solve: Callable[[Case], Row]
+) -> tuple[Boundaries, list[Row]]:
+    """The boundaries of one slice, and the rows of the cases solved for it besides those known."""
+    rows = {row.case: row for row in known}
+    new: list[Row] = []
+
+    def all_of(cases: Sequence[Case]) -> list[Row]:
+        for case in dict.fromkeys(cases):
+            if case not in rows:
+                rows[case] = solve(case)
+                new.append(rows[case])
+        return [rows[case] for case in cases]
+
+    return _Diagram(part, all_of).boundaries(), new
+
+
+def slices(family: Family, rows: Sequence[Row]) -> list[Slice]:
+    """The squares of a diagram; of a cube at the scan's coarsest values of the second coordinate.
+
+    Each with the rows in it, by their place.
+    """
+    found: dict[tuple[str, float | None], Placed] = defaultdict(dict)
+    for row in rows:
+        unit = family.unit(row.case)
+        if unit is None or not row.ok:
+            continue
+        plane = None
+        if family.dimension == 3:
+            middle = round(unit[1] * family.coarse)
+            if abs(unit[1] * family.coarse - middle) > 1e-6:
+                continue
+            plane = middle / family.coarse
+        for sheet in family.sheets:
+            if row.case.twist_axis == sheet or row.case.b_over_a == 1.0:
+                found[sheet, plane][unit[0], unit[-1]] = row
+    return [
+        Slice(family, sheet, plane, placed)
+        for (sheet, plane), placed in sorted(
+            found.items(), key=lambda item: (family.sheets.index(item[0][0]), item[0][1] or 0.0)
+        )
+    ]
+
+
+class _Diagram:
+    """One unit square of a family: its cases, and what happens between them."""
+
+    def __init__(self, part: Slice, solve: Solve) -> None:
+        self.family, self.sheet, self.plane, self.placed = part
+        self.solve = solve
+        low, high = self.family.ranges[-1]
+        self.height = high - low  # of h/t
+
+    def case(self, u: Array | tuple[float, float]) -> Case:
+        """The case at a place, also a little outside of the square."""
+        x, y = (min(max(float(part), 0.0), 1.0) for part in u)
+        unit = (x, y) if self.plane is None else (x, self.plane, y)
+        return self.family.case(self.sheet, unit)
+
+    def boundaries(self) -> Boundaries:
+        """All boundaries between the cases of a scan."""
+        lines: list[Line] = []
+        crossings = crossings_of(self.placed)
+        for crossing in crossings:  # one after the other: a curve explains many
+            if not _explained(crossing, lines):
+                self._trace(crossing, lines)
+        kept, met = self._kept(lines)
+        left = [crossing for crossing in crossings if not _explained(crossing, kept)]
+        found = len(lines)
+        left = self._bisected(left, NARROW)
+        for narrow in left:
+            # so close to the boundary the state that makes it is almost there
+            if not _explained(narrow, kept):
+                self._trace(narrow, lines)
+        if len(lines) > found:
+            kept, met = self._kept(lines)
+            left = [narrow for narrow in left if not _explained(narrow, kept)]
+        kept, met = self._continued(lines, kept, met)
+        left = [narrow for narrow in left if not _explained(narrow, kept)]
+        curves = [self._curve(line) for line in kept]
+        points: dict[str, list[BoundaryPoint]] = defaultdict(list)
+        for narrow in self._bisected(left, BISECTED):
+            points[narrow.kind].append(self._between(narrow))
+        curves += [
+            Curve(f"{kind} (bisected)", self.sheet, chain)
+            for kind, some in points.items()
+            for chain in self._chains(some)
+        ]
+        return Boundaries(curves, [self._corner(one) for one in met])
+
+    # --- curves of a condition ---
+
+    def _trace(self, crossing: Crossing, lines: list[Line]) -> None:
+        """Add the curves that may bound what differs between two cases, until one does."""
+        for kind in _bounding(crossing.kind):
+            points = self._traced(kind, crossing)
+            if points and not _known(kind, points, lines):
+                lines.append(Line(kind, points, [None] * len(points)))
+            if points and _explained(crossing, lines):
+                return
+
+    def _continued(
+        self, lines: list[Line], kept: list[Line], met: list[Met]
+    ) -> tuple[list[Line], list[Met]]:
+        """What is kept, with the curves on which those that lead nowhere go on."""
+        asked: list[Array] = []
+        for _ in range(ROUNDS):
+            before = len(lines)
+            ends = [end for end in _loose(kept, met) if distance(end, np.array(asked)) > BESIDE]
+            asked += ends
+            for crossing in self._bisected(self._around(ends, kept), NEAREST):
+                self._trace_all(crossing, lines)
+            if len(lines) == before:
+                break
+            kept, met = self._kept(lines)
+        return kept, met
+
+    def _around(self, ends: list[Array], kept: list[Line]) -> list[Crossing]:
+        """Unlike neighbours on small circles, with no curve between that bounds what differs."""
+        turns = 2.0 * math.pi * np.arange(ROUND) / ROUND
+        circle = BESIDE * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        found = []
+        for end in ends:
+            places = [(float(u[0]), float(u[1])) for u in np.clip(end + circle, 0.0, 1.0)]
+            rows = self.solve([self.case(u) for u in places])
+            there = list(zip(places, rows, strict=True))
+            for (a, first), (b, second) in pairwise([*there, there[0]]):
+                chord = np.array([a, b])
+                for kind in differences(first, second):
+                    bounding = [line for line in kept if line.kind in _bounding(kind)]
+                    if not any([*meetings(chord, line.places)] for line in bounding):
+                        found.append(Crossing(kind, a, b, first, second))
+        return found
+
+    def _trace_all(self, crossing: Crossing, lines: list[Line]) -> None:
+        """Add the first curve that is not known and may bound what differs between two cases."""
+        for kind in _bounding(crossing.kind):
+            points = self._traced(kind, crossing)
+            if points and not _known(kind, points, lines):
+                lines.append(Line(kind, points, [None] * len(points)))
+                return
+
+    def _traced(self, kind: str, crossing: Crossing) -> list[At[Value]]:
+        """The curve between two cases, followed to its ends; none where no condition finds one."""
+        condition = self._condition(kind)
+        for row, place in ((crossing.first, crossing.a), (crossing.second, crossing.b)):
+            for seed in seeds(kind, row):
+                try:
+                    near = corrected(condition, np.array(place), seed, near=REACH * crossing.gap)
+                    if crossing.apart(near.u) < REACH * crossing.gap:
+                        return trace(condition, near.u, near.state, states=self._states())
+                except Lost:
+                    continue
+        return []
+
+    def _condition(self, kind: str) -> Function[Value]:
+        condition = KINDS[kind].condition
+
+        def value(u: Array, seed: Value) -> tuple[float, Value]:
+            try:
+                if kind == INFINITE and is_half(seed):
+                    found = infinite_slope_near(self._scene, u, seed)
+                else:
+                    found = condition(self._scene(u), seed)
+            except ValueError as wrong:
+                raise Lost(str(wrong)) from wrong
+            return found.value, found
+
+        return value
+
+    def _scene(self, u: Array) -> Scene:
+        """The scene at a place; derivatives by a state ask for the same one again."""
+        return _scene(self.case(u))
+
+    def _states(self) -> States[Value]:
+        return States(lambda seed: across(self._scene, fresh(seed)), numbers)
+
+    def _curve(self, line: Line) -> Curve:
+        points = [
+            self._point(at, self._error(line.kind, at) if met is None else self.height * met.error)
+            for at, met in zip(line.points, line.corners, strict=True)
+        ]
+        return Curve(line.kind, self.sheet, tuple(points))
+
+    def _corner(self, met: Met) -> Corner:
+        point = self._point(met.first, self.height * met.error)
+        return Corner(met.kinds, self.sheet, point)
+
+    def _point(self, at: At[Value], error: float) -> BoundaryPoint:
+        state = at.state.at
+        return BoundaryPoint(self.case(at.u), state.gamma, state.moment, error)
+
+    def _error(self, kind: str, at: At[Value]) -> float:
+        """Error of the place in h/t: what is left of the condition, and what halving changes."""
+        state = at.state
+        try:
+            fine = on(state.at.mesh.halved, state)
+            change = self._condition(kind)(at.u, fine)[0] - state.value
+        except Lost:
+            return math.inf
+        return self.height * (at.distance + abs(change) / float(np.linalg.norm(at.gradient)))
+
+    def _kept(self, lines: list[Line]) -> tuple[list[Line], list[Met]]:
+        """Pieces of curves on whose two sides the modes differ by their kind, and their corners."""
+        lines = [Line(line.kind, list(line.points), [None] * len(line.points)) for line in lines]
+        met = mark_corners(lines, self._condition)
+        asked = [(n, k) for n, line in enumerate(lines) for k in where(asked_beside(line))]
+        holds: list[list[bool | None]] = [[None] * len(line.points) for line in lines]
+        for _ in range(SHARPER):
+            for (n, k), held in zip(asked, self._hold(lines, asked), strict=True):
+                holds[n][k] = held
+            if not (asked := self._sharpened(lines, holds)):
+                break
+        pieces: list[Line] = []
+        for line, own in zip(lines, holds, strict=True):
+            pieces += pieces_of(line, own)
+        pieces.sort(key=lambda piece: -len(piece.points))
+        kept: list[Line] = []
+        for piece in pieces:
+            if not _known(piece.kind, piece.points, kept):
+                kept.append(piece)
+        there = {(corner, piece.kind) for piece in kept for corner in piece.corners}
+        met = [replace(m, kinds=tuple(k for k in m.kinds if (m, k) in there)) for m in met]
+        return kept, [one for one in met if len(one.kinds) > 1]
+
+    def _hold(self, lines: list[Line], asked: list[tuple[int, int]]) -> Iterator[bool | None]:
+        """Whether the modes on the two sides of points differ; None where that is not to be had."""
+        sides = [beside(lines[n], k, lines) for n, k in asked]
+        rows = iter(self.solve([self.case(u) for places in sides for u in places]))
+        for (n, _), places in zip(asked, sides, strict=True):
+            yield _bounds(lines[n].kind, next(rows), next(rows)) if places else None
+
+    def _sharpened(
+        self, lines: list[Line], holds: list[list[bool | None]]
+    ) -> list[tuple[int, int]]:
+        """New points between neighbours of which one bounds something and the other does not."""
+        new = []
+        for n, (line, own) in enumerate(zip(lines, holds, strict=True)):
+            added = 0
+            for k in unlike(line, own, NARROW):
+                a, b = line.points[k + added : k + added + 2]
+                try:
+                    at = corrected(self._condition(line.kind), 0.5 * (a.u + b.u), a.state)
+                except Lost:
+                    continue
+                added += 1
+                line.insert(k + added, at, None)
+                own.insert(k + added, None)
+                new.append((n, k + added))
+        return new
+
+    # --- what only the label tells ---
+
+    def _bisected(self, crossings: list[Crossing], width: float) -> list[Crossing]:
+        """Two cases between each two, so close together, that differ likewise; in lockstep."""
+        while crossings and max(crossing.gap for crossing in crossings) > width:
+            middles = [crossing.middle for crossing in crossings]
+            rows = self.solve([self.case(middle) for middle in middles])
+            halves = [
+                crossing.halved((float(middle[0]), float(middle[1])), row)
+                for crossing, middle, row in zip(crossings, middles, rows, strict=True)
+            ]
+            crossings = [half for half in halves if half is not None]
+        return crossings
+
+    def _between(self, narrow: Crossing) -> BoundaryPoint:
+        """The place between two cases, with the last fold of the one that has any."""
+        row = narrow.first if narrow.first.folds else narrow.second
+        gamma = max(row.folds, default=math.nan)
+        error = self.height * narrow.gap
+        return BoundaryPoint(self.case(narrow.middle), gamma, math.nan, error)
+
+    def _chains(self, points: list[BoundaryPoint]) -> Iterator[tuple[BoundaryPoint, ...]]:
+        """Points in the order of their curves: each the nearest to the one before."""
+        left = [(np.array(self._place(p.case)), p) for p in points]
+        left.sort(key=lambda item: tuple(item[0]))
+        chain: list[tuple[Array, BoundaryPoint]] = []
+        while left:
+            if chain:
+                apart = [float(np.linalg.norm(u - chain[-1][0])) for u, _ in left]
+                k = int(np.argmin(apart))
+                if apart[k] > 3.0 / self.family.coarse:
+                    yield tuple(p for _, p in chain)
+                    chain = []
+                    continue
+                chain.append(left.pop(k))
+            else:
+                chain.append(left.pop(0))
+        if chain:
+            yield tuple(p for _, p in chain)
+
+    def _place(self, case: Case) -> tuple[float, float]:
+        unit = self.family.unit(case) or (0.0,) * self.family.dimension
+        return unit[0], unit[-1]
+
+
+@lru_cache(maxsize=16)
+def _scene(case: Case) -> Scene:
+    return case.scene()
+
+
+def _loose(kept: list[Line], met: list[Met]) -> list[Array]:
+    """The ends of curves that lead nowhere."""
+    ends = [(line.corners[0] in met, line.corners[-1] in met) for line in kept]
+    return [kept[n].points[k].u for n, k in loose_ends([line.places for line in kept], ends)]
+
+
+def _explained(crossing: Crossing, lines: Iterable[Line]) -> bool:
+    """Whether a curve that bounds what differs passes between two cases, or close by."""
+    kinds = _bounding(crossing.kind)
+    reach = max(0.75 * crossing.gap, SAME_CURVE)
+    return any(
+        line.kind in kinds and distance(crossing.middle, line.places) < reach for line in lines
+    )
+
+
+def _known(kind: str, points: Sequence[At[Value]], lines: Iterable[Line]) -> bool:
+    """Whether a curve has been followed before: its middle lies on one of the same kind."""
+    middle = points[len(points) // 2].u
+    return any(line.kind == kind and distance(middle, line.places) < SAME_CURVE for line in lines)
+
+
+def _bounds(kind: str, one: Row, other: Row) -> bool:
+    """Whether two cases differ by what a curve of this kind bounds."""
+    return any(kind in _bounding(what) for what in differences(one, other))
+
+
+def _bounding(what: str) -> tuple[str, ...]:
+    """Kinds of boundaries at which this changes, the likeliest first."""
+    return (FOLD, INFINITE, EXCHANGE) if what == FOLD else (what, EXCHANGE)

@@ -1,0 +1,252 @@
+"""One case of a phase diagram: a ring and its section, and the row that says how it folds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from der.geometry.ring import Ring, ring_from_json
+from der.geometry.section import rectangular_section
+from der.records.path import Path
+from der.scene import Scene
+
+UNFOLDABLE = "unfoldable"
+LABELS = (
+    UNFOLDABLE,
+    "unstable, snap-through",
+    "unstable, snap-back",
+    "stable, snap-through",
+    "stable, snap-back",
+)
+FAILED = "failed"  # stands in place of a label
+PARAMETERS = ("b_over_a", "r_over_a", "vertex_angle", "natural_curvature", "h_over_t", "nu")
+OWN = {  # parameters of each shape, besides those of the section
+    "circle": ("natural_curvature",),
+    "ellipse": ("b_over_a",),
+    "rectangle": ("b_over_a", "r_over_a"),
+    "triangle": ("vertex_angle", "r_over_a"),
+}
+TOLERANCE = 1e-6  # solved to 1e-8, none of 180 cases beside boundaries had another label
+
+
+@dataclass(frozen=True)
+class Case:
+    """A ring to be folded; parameters that its shape has not are None.
+
+    Parameters
+    ----------
+    shape : "circle", "ellipse", "rectangle" or "triangle"
+    h_over_t : height over thickness of the section
+    twist_axis : "x" or "y"
+    b_over_a : short semi-axis over the long one
+    r_over_a : radius of the fillets
+    vertex_angle : of a triangle at the apex [degrees]
+    natural_curvature : of a circle [1/a]
+    nu : Poisson's ratio
+    tolerance : of the boundary-value problem, see `validation.solve`
+
+    Raises
+    ------
+    ValueError
+        For an unknown shape, or a parameter that is missing or that the shape has not. Values are
+        checked where the case is solved.
+    """
+
+    shape: str
+    h_over_t: float
+    twist_axis: str = "x"
+    b_over_a: float | None = None
+    r_over_a: float | None = None
+    vertex_angle: float | None = None
+    natural_curvature: float | None = None
+    nu: float = 0.3
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        if self.shape not in OWN:
+            raise ValueError(f"shape must be one of {', '.join(OWN)}, got {self.shape!r}")
+        for name in PARAMETERS[:-2]:
+            given, needed = getattr(self, name), name in OWN[self.shape]
+            if (given is None) is needed:
+                word = "given" if needed else "left out"
+                raise ValueError(f"{name} must be {word} for shape {self.shape!r}, got {given!r}")
+
+    def to_json(self) -> dict[str, Any]:
+        """What is not None, by name; a JSON object."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+    @property
+    def key(self) -> str:
+        """Hash of the parameters, the tolerance and the version of this package."""
+        text = json.dumps([self.to_json(), _version()], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+    def ring(self) -> Ring:
+        """The ring.
+
+        Raises
+        ------
+        ValueError
+            If a value is not allowed.
+        """
+        own = {name: getattr(self, name) for name in OWN[self.shape]}
+        return ring_from_json({"shape": self.shape, **own, "twist_axis": self.twist_axis})
+
+    def scene(self, **wanted: Any) -> Scene:
+        """The scene with ring and section, and what else is wanted of it.
+
+        Raises
+        ------
+        ValueError
+            If a value is not allowed.
+        """
+        return Scene(self.ring(), rectangular_section(self.h_over_t, self.nu), **wanted)
+
+
+@dataclass(frozen=True)
+class Row:
+    """How a case folds; numbers are None, and truths False, where the case failed.
+
+    Attributes
+    ----------
+    case : what was solved
+    label : one of LABELS, or FAILED
+    foldable, stable : see `der.records.path.folding_mode`; an unfoldable ring is not called stable
+    snapping : "none", "snap-through" or "snap-back", of unfoldable rings too
+    moment, slope : M [GJ/a] and dM/dgamma at the first arrival at pi
+    folds : gammas of the folds [rad], in path order
+    error : largest estimated error on the path, of gamma/pi and of M over the largest |M|
+    seconds : what it took
+    status : "ok" or "failed"
+    message : why it failed
+    """
+
+    case: Case
+    label: str
+    foldable: bool = False
+    stable: bool = False
+    snapping: str = "none"
+    moment: float | None = None
+    slope: float | None = None
+    folds: tuple[float, ...] = ()
+    error: float | None = None
+    seconds: float = 0.0
+    status: str = "ok"
+    message: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the case was solved."""
+        return self.status == "ok"
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        entries = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return entries | {"case": self.case.to_json(), "folds": list(self.folds)}
+
+    @classmethod
+    def from_json(cls, entries: Mapping[str, Any]) -> Row:
+        """The row that `to_json` wrote.
+
+        Raises
+        ------
+        ValueError
+            If an entry is missing or not known.
+        """
+        try:
+            known = {
+                **entries,
+                "case": Case(**entries["case"]),
+                "folds": tuple(entries["folds"]),
+            }
+            return cls(**known)
+        except (KeyError, TypeError) as problem:
+            raise ValueError(f"not a row: {problem}") from problem
+
+
+def solve_case(case: Case) -> Row:
+    """How a case folds, by the boundary-value problem.
+
+    A case that cannot be stated or solved is a row that says why; nothing is raised.
+    """
+    from der.bvp.solve import solve  # kernels: only where cases are solved, not where counted
+
+    started = time.perf_counter()
+    try:
+        path = solve(case.scene(save_at=()), tolerance=case.tolerance)
+        row = row_of(case, path)
+    except Exception as problem:  # whatever it is, it must not take the other cases along
+        row = failed(case, f"{type(problem).__name__}: {problem}")
+    return _timed(row, time.perf_counter() - started)
+
+
+def failed(case: Case, why: str) -> Row:
+    """The row of a case that could not be solved."""
+    return Row(case, FAILED, status="failed", message=why)
+
+
+def row_of(case: Case, path: Path) -> Row:
+    """The row of a path from gamma = 0 to pi, of either solver."""
+    mode, at_pi = path.mode, path.at_pi
+    if mode is None:
+        return failed(case, "the path has not reached pi")
+    label = label_of(mode.foldable, mode.stable, mode.snapping)
+    if label == FAILED:
+        return failed(case, "a foldable ring without a limit of M")
+    return Row(
+        case,
+        label,
+        mode.foldable,
+        bool(mode.stable),
+        mode.snapping,
+        None if at_pi is None else at_pi.moment,  # a path that turns back never arrives
+        None if at_pi is None else at_pi.slope,
+        tuple(point.gamma for point in path.folds),
+        _error(path),
+    )
+
+
+def label_of(foldable: bool, stable: bool | None, snapping: str) -> str:
+    """The label of a folding mode; the snapping of unfoldable rings is no part of it.
+
+    M vanishes at 0 and pi of a foldable ring, so that it has a limit at least: FAILED without.
+    """
+    if not foldable:
+        return UNFOLDABLE
+    if snapping == "none":
+        return FAILED
+    return f"{'stable' if stable else 'unstable'}, {snapping}"
+
+
+def _error(path: Path) -> float | None:
+    """Largest estimated error of a path, relative; None where one is not known."""
+    if path.error is None:
+        return None
+    bars: Any = path.error
+    scales = (math.pi, float(np.abs(path.moment).max()))
+    parts = [
+        value / scale
+        for name, scale in zip(("gamma", "moment"), scales, strict=True)
+        for value in bars[name]
+        if value is not None
+    ]
+    return float(max(parts, default=math.nan)) if len(parts) == 2 * len(path) else None
+
+
+def _timed(row: Row, seconds: float) -> Row:
+    entries = {entry.name: getattr(row, entry.name) for entry in fields(row)}
+    return Row(**entries | {"seconds": round(seconds, 6)})
+
+
+@cache
+def _version() -> str:
+    return version("ring-origami")

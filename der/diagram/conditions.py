@@ -1,0 +1,307 @@
+"""What holds on a boundary between folding modes, as a function of the ring and its section.
+
+    stability        the folded state at gamma = pi has dM/dgamma = 0
+    foldability      the fold at which the path turns back lies at gamma = pi
+    infinite slope   the folded state is where the path turns back: dgamma/dM = 0 there
+    snap-back        two folds merge: dgamma/ds has an extremum that is zero (a cusp)
+    exchange         the path from the flat ring meets another one, and beyond follows that
+
+Each is the value of a function of two parameters, evaluated by a few corrections from a solution
+nearby: no path is followed. Solutions are carried from ring to ring on meshes that scale segment by
+segment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from der.bvp.collocation import Collocation, Direction, Failure, Solution, collocation
+from der.bvp.corrector import observe
+from der.bvp.gauss import Array
+from der.bvp.meshes import Mesh, fitted, mesh_at, moved_to
+from der.bvp.sectors import sector
+from der.diagram.branch_exchange import Centre, centre, hysteresis, shot
+from der.scene import Scene
+
+ACCURATE = 1e-9  # of gamma/pi and M: beyond, a mesh is fitted again
+TIGHT = 1e-11  # increments of a solution from which a condition is judged
+PROBE = 1e-3  # of s: first step of a secant
+BULGE = 1e-2  # of s: for a third derivative
+SMALL = 1e-10  # of s: a secant step that has converged
+FOLDED = 0.02  # M of a state that is about the folded one; its gamma less pi is less than the cube
+FARTHEST = 0.5  # of s: what lies farther is another state
+MOST = 20
+
+
+class Lost(RuntimeError):
+    """A condition that cannot be evaluated: its state has ceased to exist."""
+
+
+class Value(NamedTuple):
+    """A condition at a ring and section."""
+
+    value: float
+    at: Solution
+    system: Collocation
+    psi: Array | None = None  # of an exchange, see `exchanges`: its state has no tangent
+    bend: Array | None = None  # likewise
+    way: Array | None = None  # of an infinite slope, see `folded_states`: across the boundary
+    place: Array | None = None  # likewise: on the boundary, of which the state is
+
+
+Condition = Callable[[Scene, Value], Value]
+
+
+def carried(scene: Scene, seed: Value) -> tuple[Collocation, Solution]:
+    """The seed's solution as a guess for another ring, corrected there across its tangent.
+
+    Raises
+    ------
+    Lost
+        Where the rings have other segments, or no solution is near.
+    """
+    system, mesh = scaled(scene, seed)
+    at = seed.at
+    found = system.solved(
+        mesh, Direction(at.frames, at.p, at.gamma), at.tangent, tolerance=TIGHT, iterations=15
+    )
+    if isinstance(found, Failure):
+        raise Lost(found.reason)
+    return system, found
+
+
+def scaled(scene: Scene, seed: Value) -> tuple[Collocation, Mesh]:
+    """The seed's mesh for another ring, segment by segment.
+
+    Raises
+    ------
+    Lost
+        Where the rings have other segments.
+    """
+    system = collocation(sector(scene))
+    old, new = seed.system.sector, system.sector
+    if len(old.joints) != len(new.joints):
+        raise Lost(f"the ring has {len(new.joints) - 1} segments, not {len(old.joints) - 1}")
+    nodes = np.interp(seed.at.mesh.nodes, old.joints, new.joints)
+    nodes[-1] = new.joints[-1]
+    return system, mesh_at(new, system.rule, nodes)
+
+
+def on(mesh: Mesh, seed: Value) -> Value:
+    """The same state on another mesh.
+
+    Raises
+    ------
+    Lost
+        Where it cannot be solved for there.
+    """
+    system, at = seed.system, seed.at
+    if seed.psi is None:
+        found = system.on(mesh, at)
+        if isinstance(found, Failure):
+            raise Lost(found.reason)
+        return seed._replace(at=found)
+    frames = moved_to(at.mesh, at.nodes[:-1], at.frames, mesh.stages)
+    return _exchanged(system, mesh, frames, seed)
+
+
+def fresh(seed: Value) -> Value:
+    """The same solution on a mesh fitted to it, where its own has become too coarse."""
+    at = seed.at
+    try:
+        size = _size(seed)
+        if size <= ACCURATE:
+            return seed
+        factor = min((size / (0.1 * ACCURATE)) ** 0.125, 2.0)
+        n = math.ceil(factor * len(at.mesh.h))
+        return on(fitted(at.mesh, at.nodes[:-1], at.frames, n), seed)
+    except Lost:
+        return seed
+
+
+def _size(seed: Value) -> float:
+    """The error of a state's gamma/pi and M."""
+    system, at = seed.system, seed.at
+    if seed.psi is None:
+        error = system.error(at)
+        gamma, moment = error.gamma, error.moment
+    else:
+        fine = on(at.mesh.halved, seed).at
+        gamma, moment = abs(fine.gamma - at.gamma), abs(fine.moment - at.moment)
+    return max(gamma / math.pi, moment / max(abs(at.moment), 1.0))
+
+
+def numbers(state: Value) -> Array:
+    """The constants of a state and its gamma."""
+    return np.append(state.at.p, state.at.gamma)
+
+
+def stability(scene: Scene, seed: Value) -> Value:
+    """DM/ds at gamma = pi; the seed is a folded state."""
+    system, near = carried(scene, seed)
+    found = system.solved(
+        near.mesh,
+        Direction(near.frames, near.p, math.pi),
+        near.tangent,
+        by_gamma=True,
+        tolerance=TIGHT,
+        iterations=15,
+    )
+    if isinstance(found, Failure):
+        raise Lost(found.reason)
+    return Value(found.moment_rate, found, system)
+
+
+def infinite_slope(scene: Scene, seed: Value) -> Value:
+    """Dgamma/ds where M = 0; the seed is a folded state.
+
+    Gamma less pi is odd in M along the path, by the mirror image of a ring that is turned back.
+    Past this boundary the path crosses pi three times, at rest the second time only.
+    """
+    system, near = carried(scene, seed)
+    found = _root(system, near, lambda at: at.moment)
+    return Value(found.tangent.gamma, found, system)
+
+
+def steepening(seed: Value) -> float:
+    """Third derivative of gamma along the path at a folded state, where the second is none.
+
+    Differences of the first over two distances, extrapolated: to the fourth power of them.
+    """
+    here = seed.at.tangent.gamma
+    wide, narrow = (
+        2.0 * (_moved(seed.system, seed.at, s).tangent.gamma - here) / s**2
+        for s in (BULGE, 0.5 * BULGE)
+    )
+    return (4.0 * narrow - wide) / 3.0
+
+
+def foldability(scene: Scene, seed: Value) -> Value:
+    """Gamma less pi at a fold; the seed is one, and not the folded state of `infinite_slope`."""
+    system, near = carried(scene, seed)
+    fold = _root(system, near, lambda at: at.tangent.gamma)
+    _not_folded(fold)
+    return Value(fold.gamma - math.pi, fold, system)
+
+
+def snap_back(scene: Scene, seed: Value) -> Value:
+    """The extremum of dgamma/ds, where gamma bends from one way to the other; the seed has it.
+
+    The folded state is always one, by symmetry, with `infinite_slope` as its condition: a cusp and
+    its mirror image may merge in it, and end there.
+    """
+    system, near = carried(scene, seed)
+    bend = _root(system, near, lambda at: _bend(system, at))
+    _not_folded(bend)
+    return Value(bend.tangent.gamma, bend, system)
+
+
+def _not_folded(at: Solution) -> None:
+    """A fold or cusp that has merged with its mirror image has a condition of its own."""
+    if abs(at.moment) < FOLDED and abs(at.gamma - math.pi) < FOLDED**3:
+        raise Lost("it has become the folded state")
+
+
+def exchange(scene: Scene, seed: Value) -> Value:
+    """How far two branches of equilibria are from meeting; the seed lies between them."""
+    system, mesh = scaled(scene, seed)
+    return _exchanged(system, mesh, seed.at.frames, seed)
+
+
+def _exchanged(system: Collocation, mesh: Mesh, frames: Array, seed: Value) -> Value:
+    """The centre of an exchange, from frames on this mesh."""
+    x = np.append(seed.at.p, seed.at.gamma)
+    found = centre(system, mesh, frames, x, seed.psi, seed.bend)
+    if found is None:
+        raise Lost("no two branches nearby")
+    return Value(found.mu, _state(system, mesh, found), system, found.psi, bend=found.bend)
+
+
+def _state(system: Collocation, mesh: Mesh, found: Centre) -> Solution:
+    """The centre of an exchange as a solution, which has no tangent."""
+    at, p, gamma = found.shot, found.x[:-1], float(found.x[-1])
+    moment, energy = observe(system.sector.piece, mesh.h, mesh.rest, at.frames, p)
+    none = Direction(np.zeros_like(at.frames), np.zeros_like(p), 0.0)
+    energy *= system.sector.copies
+    return Solution(mesh, at.frames, p, gamma, moment, energy, none, 0.0, 0, at.nodes, at.places, 0)
+
+
+def asymptotic(state: Value) -> float:
+    """Zero where an exchange touches a cusp, see `exchanges.hysteresis`."""
+    at, psi = state.at, state.psi
+    if psi is None:
+        raise Lost("not the state of an exchange")
+    try:
+        return hysteresis(state.system, at.mesh, at.frames, np.append(at.p, at.gamma), psi)
+    except ArithmeticError as problem:
+        raise Lost(str(problem)) from problem
+
+
+def closeness(system: Collocation, at: Solution) -> tuple[float, Array]:
+    """How near a state is to an exchange, and its psi.
+
+    The smallest singular value of the derivatives of the conditions at the end over the largest.
+    """
+    found = shot(system, at.mesh, at.frames, np.append(at.p, at.gamma))
+    if not found.ok:
+        return math.inf, np.zeros_like(at.p)
+    left, values, _ = np.linalg.svd(found.rates)
+    return float(values[-1] / values[0]), left[:, -1]
+
+
+def _moved(system: Collocation, at: Solution, s: float) -> Solution:
+    """The solution at a small distance along the path."""
+    t = at.tangent
+    guess = Direction(at.frames + s * t.frames, at.p + s * t.p, at.gamma + s * t.gamma)
+    found = system.solved(at.mesh, guess, t, tolerance=TIGHT, iterations=15)
+    if isinstance(found, Failure):
+        raise Lost(found.reason)
+    return found
+
+
+def _bend(system: Collocation, at: Solution) -> float:
+    """d2 gamma/ds2, by central differences."""
+    ahead, behind = (_moved(system, at, s) for s in (PROBE, -PROBE))
+    return (ahead.tangent.gamma - behind.tangent.gamma) / (2.0 * PROBE)
+
+
+def _root(system: Collocation, at: Solution, value: Callable[[Solution], float]) -> Solution:
+    """The solution along the path at which ``value`` vanishes (secant method)."""
+    now, step, way = value(at), PROBE, 0.0
+    for _ in range(MOST):
+        new = _moved(system, at, step)
+        way += step
+        after = value(new)
+        if after == now or abs(way) > FARTHEST:
+            break
+        step = -after * step / (after - now)
+        at, now = new, after
+        if abs(step) < SMALL:
+            return at
+        step = max(-0.1, min(0.1, step))
+    raise Lost("no such state nearby on the path")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of boundary with its condition."""
+
+    name: str
+    condition: Condition
+
+
+KINDS = {
+    name: Kind(name, condition)
+    for name, condition in (
+        ("stability", stability),
+        ("foldability", foldability),
+        ("infinite slope", infinite_slope),
+        ("snap-back", snap_back),
+        ("exchange", exchange),
+    )
+}

@@ -1,0 +1,141 @@
+"""Tasks done by workers that may die: what was in flight then is done again."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from typing import Any, Generic, TypeVar
+
+from der.diagram.workers import Workers, died
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+AHEAD = 2  # tasks a worker that wait or run, so that none is idle
+DEATHS = 2  # of workers, by a thing that was worked on alone
+IN_VAIN = 8  # deaths of workers in a row with nothing done between: they cannot work here
+
+
+class Jobs(Generic[T, R]):
+    """Things to work on, in batches; batches in flight; and suspects: things whose worker died.
+
+    Parameters
+    ----------
+    crew : who works
+    work : what a worker does with a batch; must pickle
+    batches : tuples of different things
+    """
+
+    def __init__(
+        self,
+        crew: Workers,
+        work: Callable[[tuple[T, ...]], R],
+        batches: Sequence[tuple[T, ...]],
+    ) -> None:
+        self._crew = crew
+        self._work = work
+        self._waiting = deque(batches)
+        self._flight: dict[Future[R], tuple[T, ...]] = {}
+        self._suspects: deque[T] = deque()
+        self._tried: T | None = None  # the suspect in flight, alone
+        self._deaths: Counter[T] = Counter()
+        self._condemned: list[T] = []  # held back until it is known that workers can work at all
+        self._in_vain = 0
+
+    def done(self) -> Iterator[tuple[tuple[T, ...], R | None]]:
+        """Batches and what came of them, as they are finished.
+
+        Where a worker dies, what it may have had is tried again, one thing at a time. None came of
+        one that ended its worker then, DEATHS times.
+
+        Raises
+        ------
+        RuntimeError
+            If workers die before they have done anything, or the executor has given up.
+        """
+        while self._submit():
+            for found in self._collect():
+                yield from self._given_up()
+                yield found
+        yield from self._given_up()
+
+    def _given_up(self) -> Iterator[tuple[tuple[T, ...], None]]:
+        """What is condemned, once."""
+        condemned, self._condemned = self._condemned, []
+        for thing in condemned:
+            yield (thing,), None
+
+    def _submit(self) -> bool:
+        """Hand out what can be; whether anything is in flight."""
+        room = AHEAD * self._crew.width
+        while (batch := self._next(room)) is not None:
+            try:
+                self._flight[self._crew.executor.submit(self._work, batch)] = batch
+            except Exception as problem:
+                if not died(problem):
+                    raise
+                self._lose(batch)
+                self._mend()
+        return bool(self._flight)
+
+    def _collect(self) -> Iterator[tuple[tuple[T, ...], R]]:
+        """Wait, and give all batches that are finished."""
+        done = wait(self._flight, return_when=FIRST_COMPLETED).done
+        if any(_lost(task) for task in done):  # the pool is gone, and all in flight with it
+            done = wait(self._flight).done
+        broken = False
+        for task in done:
+            batch = self._flight.pop(task)
+            if _lost(task):
+                self._lose(batch)
+                broken = True
+                continue
+            found = task.result()
+            self._tried, self._in_vain = None, 0
+            yield batch, found
+        if broken:
+            self._mend()
+
+    def _next(self, room: int) -> tuple[T, ...] | None:
+        """What can be handed out next: a suspect only when nothing else is in flight."""
+        if self._suspects:
+            if self._flight:
+                return None
+            self._tried = self._suspects.popleft()
+            return (self._tried,)
+        if self._waiting and self._tried is None and len(self._flight) < room:
+            return self._waiting.popleft()
+        return None
+
+    def _lose(self, batch: tuple[T, ...]) -> None:
+        """Take note of a batch whose worker died."""
+        if self._tried is None:
+            self._suspects.extend(batch)
+            return
+        thing, self._tried = self._tried, None
+        self._deaths[thing] += 1
+        if self._deaths[thing] < DEATHS:
+            self._suspects.appendleft(thing)
+        else:
+            self._condemned.append(thing)
+
+    def _mend(self) -> None:
+        self._in_vain += 1
+        if self._in_vain >= IN_VAIN:
+            raise RuntimeError("workers die before they have solved anything")
+        self._crew.restart()
+
+
+def _lost(task: Future[Any]) -> bool:
+    """Whether a finished task's worker died.
+
+    Raises
+    ------
+    RuntimeError
+        If the executor has taken the task back.
+    """
+    if task.cancelled():
+        raise RuntimeError("the scheduler has gone, or has taken tasks back")
+    problem = task.exception()
+    return problem is not None and died(problem)

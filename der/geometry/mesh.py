@@ -1,0 +1,123 @@
+"""Where the frames of a discrete ring sit: close where it is sharply bent, on every joint.
+
+Frames sit on grips, free points and jumps of the natural curvature at every resolution; between
+these, cells share a density equally. It is the mean curvature of the folded ring beside that of the
+flat one: |k1u| + 4 pi/L (paper, Eq. B.1), so that straights, which bend most when the ring folds,
+are resolved like its fillets.
+
+Twice as many cells are the same cells halved: where cells of N halve those of N/2, a smooth
+solution's errors have even powers of 1/N. For that, the cells are shared out among the segments at
+the coarsest of the numbers n, n/2, n/4, ... that has two for each segment, and then doubled.
+"""
+
+from __future__ import annotations
+
+import heapq
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from der.geometry.outline import Array
+from der.geometry.ring import Ring
+
+CLOSE = 1e-12  # of the length: joints nearer to an end than this are that end
+FEW = 1e-3  # of a cell's share: a segment with less has no cell
+SAMPLES = 256  # of the density in a segment whose curvature varies
+
+
+def sites(ring: Ring, n_edges: int, name: str) -> Array:
+    """Arc lengths of the frames of a sector, both of its ends included.
+
+    Parameters
+    ----------
+    n_edges : edges of the full ring, divisible into the sector (`scene.sector_name`).
+    name : "full", "half" or "quarter". The full ring's first frame stands at its end, too.
+
+    Notes
+    -----
+    The sites have the ring's symmetry: those of a half are those of a quarter and their mirror
+    image. Where there are fewer cells than segments, jumps of curvature lie inside of cells, which
+    see their mean.
+    """
+    length = ring.length
+    if ring.symmetry == "D2" and n_edges % 4 == 0:
+        quarter = _graded(ring, 0.25 * length, 0.5 * length, n_edges // 4)
+        half = _mirrored(quarter, 0.5 * length)
+    else:
+        half = _graded(ring, 0.0, 0.5 * length, n_edges // 2)
+    if name == "half":
+        return half
+    return quarter if name == "quarter" else np.append(half, (length - half)[-2::-1])
+
+
+def _mirrored(s: Array, end: float) -> Array:
+    """Sites from ``end`` - s[-1] on to s[-1], of which ``s`` are the second half."""
+    return np.append((end - s)[:0:-1], s)
+
+
+def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
+    """Sites (n_cells + 1,) from ``begin`` to ``end``."""
+    margin = CLOSE * ring.length
+    joints = [begin, *(s for s in ring.breaks if begin + margin < s < end - margin), end]
+    if n_cells < len(joints) - 1:
+        joints = [begin, end]
+    segments = [_segment(ring, a, b) for a, b in pairwise(joints)]
+    # a straight that rounding leaves between two fillets deserves no cell of its own
+    least = FEW * sum(segment.weight for segment in segments) / n_cells
+    if any(segment.weight < least for segment in segments):
+        kept = [segment.end for segment in segments[:-1] if segment.weight >= least]
+        if segments[-1].weight < least:
+            kept = kept[:-1]
+        joints = [begin, *kept, end]
+        segments = [_segment(ring, a, b) for a, b in pairwise(joints)]
+    coarsest = n_cells
+    while coarsest % 2 == 0 and coarsest // 2 >= 2 * len(segments):
+        coarsest //= 2
+    counts = _shared([segment.weight for segment in segments], coarsest)
+    places = [
+        segment.places(count * (n_cells // coarsest))[:-1]
+        for segment, count in zip(segments, counts, strict=True)
+    ]
+    return np.append(np.concatenate(places), end)
+
+
+class _Segment:
+    """A piece of the ring with smooth natural curvature, and the density of frames on it."""
+
+    def __init__(self, ring: Ring, begin: float, end: float) -> None:
+        self.end = end
+        self.s = np.linspace(begin, end, SAMPLES + 1)
+        middle = 0.5 * (self.s[1:] + self.s[:-1])
+        density = np.abs(ring.curvature(middle)) + 4.0 * np.pi / ring.length
+        self.share = np.append(0.0, np.cumsum(density * np.diff(self.s)))
+        self.even = bool(np.ptp(density) <= 1e-12 * density.max())
+
+    @property
+    def weight(self) -> float:
+        """Integral of the density."""
+        return float(self.share[-1])
+
+    def places(self, count: int) -> Array:
+        """Sites (count + 1,) that share the density equally."""
+        if self.even:
+            return np.linspace(self.s[0], self.s[-1], count + 1)
+        return np.interp(np.linspace(0.0, self.weight, count + 1), self.share, self.s)
+
+
+@lru_cache(maxsize=64)
+def _segment(ring: Ring, begin: float, end: float) -> _Segment:
+    """A segment, remembered: the meshes of a ring's error bars share it."""
+    return _Segment(ring, begin, end)
+
+
+def _shared(weights: list[float], total: int) -> list[int]:
+    """Whole numbers >= 1 in proportion to ``weights``, ``total`` together (Jefferson's rule)."""
+    counts = [1] * len(weights)
+    heap = [(-weight / 2.0, k) for k, weight in enumerate(weights)]
+    heapq.heapify(heap)
+    for _ in range(total - len(weights)):
+        _, k = heapq.heappop(heap)
+        counts[k] += 1
+        heapq.heappush(heap, (-weights[k] / (counts[k] + 1.0), k))
+    return counts

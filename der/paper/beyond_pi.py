@@ -1,0 +1,82 @@
+"""The circle that does not fold, twisted on beyond pi until it does."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path as File
+
+import numpy as np
+
+from der.geometry.ring import circle
+from der.paper import canvas
+from der.paper.bars import bar
+from der.paper.cases import (
+    Case,
+    Curve,
+    at_vertices,
+    curve_of,
+    smooth,
+    write_curves,
+    write_shapes,
+)
+from der.paper.snapshots import LEVEL
+from der.utils.files import FilePath
+
+NUMERALS = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII")
+
+
+def figc1(folder: FilePath) -> list[File]:
+    """Circle, h/t = 1: moment and snapshots up to the three-covered ring."""
+    case = Case("$h/t$ = 1", circle(), 1.0)
+    curve = curve_of(case, case.solve(shapes=True, until="folded"))
+    chosen = _spread(curve)
+    figure = canvas.page(10.0, 5.6)
+    panel = figure.add_axes((0.065, 0.375, 0.92, 0.565))
+    canvas.draw_curve(panel, curve, canvas.MOMENT, canvas.COLOURS[1])
+    canvas.dress(panel, canvas.MOMENT, "R", 7 * math.pi / 4)
+    panel.set_ylim(-0.35, 4.4)
+    canvas.words(
+        panel,
+        (0.5, 1.05),
+        "Circle, $h/t$ = 1: un-foldable at the first arrival at $\\pi$; twisted on, the path ends "
+        "in the three-covered ring",
+        transform=panel.transAxes,
+        fontsize=10,
+    )
+    states = curve.states[chosen][:, :2]
+    panel.plot(*states.T, "o", color=canvas.INK, markersize=4.5, zorder=5, clip_on=False)
+    canvas.write_beside(panel, states, NUMERALS, smooth(curve)[:, :2])
+    canvas.legend_of_marks(figure, [curve], dot="state shown below")
+
+    row = figure.add_axes((0.01, 0.055, 0.98, 0.25))
+    pictures = [bar(*at_vertices(curve, k), case.h_over_t, LEVEL) for k in chosen]
+    sizes = np.array([np.ptp(picture.box, axis=0) for picture in pictures])
+    widths = np.maximum(sizes[:, 0] + 0.035 * case.ring.length, 1.9)  # room for the words
+    middles = np.cumsum(widths) - widths / 2
+    tall = float(sizes[:, 1].max())
+    for numeral, k, x, picture in zip(NUMERALS, chosen, middles, pictures, strict=True):
+        canvas.place(row, picture, (x, 0.0))
+        words = rf"$\bf{{{numeral}}}$   $\gamma$ = {curve.gamma[k] / math.pi:.3g} $\pi$"
+        words = words.replace("= 0 $\\pi$", "= 0").replace("= 1 $\\pi$", "= $\\pi$")
+        canvas.words(row, (x, -0.72 * tall), words, fontsize=8.5)
+    canvas.bare(row, (0.0, -0.85 * tall), (widths.sum(), 0.55 * tall))
+    about = "figC1: circle, h/t = 1, beyond pi until folded (a = R)"
+    return [
+        canvas.save(figure, File(folder) / "figC1.png"),
+        write_curves(File(folder) / "figC1.csv", about, [curve]),
+        write_shapes(File(folder) / "figC1_shapes.csv", about, [(curve, k) for k in chosen]),
+    ]
+
+
+def _spread(curve: Curve) -> list[int]:
+    """States spread evenly over the ring's motion; the first arrival at pi and the last are in."""
+    if curve.shapes is None:
+        raise ValueError("curve must have shapes to be drawn, got none")
+    moved = np.linalg.norm(np.diff(curve.shapes.x, axis=0), axis=(1, 2))
+    way = np.append(0.0, np.cumsum(moved))
+    even = np.linspace(0.0, way[-1], len(NUMERALS))
+    chosen = [int(np.argmin(np.abs(way - place))) for place in even]
+    at_pi = curve.first(math.pi)
+    nearest = min(range(1, len(chosen) - 1), key=lambda i: abs(way[chosen[i]] - way[at_pi]))
+    chosen[nearest] = at_pi
+    return chosen

@@ -1,0 +1,266 @@
+"""What the figures show: rings with their sections, their paths, and tables of the states."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as File
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from der.bvp.solve import solve
+from der.geometry.mesh import sites
+from der.geometry.ring import Ring
+from der.geometry.section import rectangular_section
+from der.records.configurations import Shapes
+from der.records.path import Mode, Path, Point
+from der.scene import Scene
+from der.utils.files import FilePath, write_whole
+
+Array: TypeAlias = NDArray[np.float64]
+
+STATES = 64  # at least, from gamma = 0 to pi: the spline through them is then within 6e-4 of
+PER = 8  # the panel of one through 1024, measured on every curve of the figures
+N_EDGES = 256  # of a drawn ring: 10 in the sharpest fillet
+SAME = 1e-6  # of the curve; states that are closer (a fold next to a saved state) make no slope
+ARRIVED = 1e-9  # rad
+
+RING_COLUMNS = {
+    "ring": "circle or ellipse or rectangle or triangle",
+    "twist_axis": "x: grips at the ends of the short semi-axis; y: of the long one",
+    "b_over_a": "short semi-axis over the long one",
+    "r_over_a": "radius of the fillets",
+    "vertex_angle": "of the triangle at the apex [degrees]",
+    "h_over_t": "height over thickness of the section; Poisson's ratio is 0.3",
+}
+STATE_COLUMNS = {
+    "gamma": "rotation of one grip [rad]",
+    "moment": "of one arm [GJ/a]",
+    "energy": "of the full ring [GJ/a]",
+    "error_gamma": "estimated error of gamma [rad]",
+    "error_moment": "of the moment [GJ/a]",
+    "error_energy": "of the energy [GJ/a]",
+}
+POINT_COLUMN = {"point": "fold: gamma turns back; limit: the moment turns back; else empty"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A ring and the height over thickness of its section, with the words for them.
+
+    Parameters
+    ----------
+    label : what tells it from the others in its panel, "h/t = 4"; may hold mathtext.
+    panel : the part of the figure that shows it; empty where there is but one.
+    cut : the curve is drawn up to its first arrival at this gamma [rad] only.
+    """
+
+    label: str
+    ring: Ring
+    h_over_t: float
+    panel: str = ""
+    cut: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The case in a table: panel and label in plain letters."""
+        return plain(f"{self.panel} {self.label}")
+
+    def entries(self) -> list[str]:
+        """Its cells in a table: `case` and RING_COLUMNS."""
+        ring = self.ring.to_json()
+        shape = ring["shape"]
+        cells = [ring.get(name, "") for name in ("b_over_a", "r_over_a", "vertex_angle")]
+        axis = ring["twist_axis"] if shape in ("ellipse", "rectangle") else ""
+        return [self.name, str(shape), str(axis), *map(str, cells), repr(float(self.h_over_t))]
+
+    def solve(
+        self,
+        *,
+        save_at: Sequence[float] | None = None,
+        shapes: bool = False,
+        until: str | None = None,
+    ) -> Path:
+        """The path from gamma = 0 to pi, or until folded; saved at multiples of pi/STATES."""
+        if save_at is None:
+            turns = 1 if until is None else 2
+            save_at = [math.pi * i / STATES for i in range(turns * STATES + 1)]
+        scene = Scene(
+            self.ring,
+            rectangular_section(h_over_t=self.h_over_t),
+            n_edges=N_EDGES,
+            shapes=shapes,
+            until=until,
+            save_at=save_at,
+        )
+        return solve(scene)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The states of a path that a figure shows.
+
+    Attributes
+    ----------
+    states : (n, 6) array, STATE_COLUMNS in path order
+    points : folds and limits among them
+    mode : of the whole path, None where it ends before pi
+    shapes : of the states, None where they were not asked for
+    """
+
+    case: Case
+    states: Array
+    points: tuple[Point, ...]
+    mode: Mode | None
+    shapes: Shapes | None
+
+    @property
+    def gamma(self) -> Array:
+        """Rotation of one grip [rad], (n,)."""
+        return self.states[:, 0]
+
+    @property
+    def moment(self) -> Array:
+        """Of one arm [GJ/a], (n,)."""
+        return self.states[:, 1]
+
+    @property
+    def energy(self) -> Array:
+        """Of the full ring [GJ/a], (n,)."""
+        return self.states[:, 2]
+
+    def first(self, gamma: float) -> int:
+        """Position of the state of the first arrival at gamma, which was solved for."""
+        return int(np.flatnonzero(np.abs(self.gamma - gamma) < ARRIVED)[0])
+
+
+def curve_of(case: Case, path: Path) -> Curve:
+    """The curve of a path, cut where the case says."""
+    n = len(path)
+    if case.cut is not None:
+        n = int(np.flatnonzero(path.gamma >= case.cut - ARRIVED)[0]) + 1
+    error = path.error or {}
+    errors = [error.get(name, [math.nan] * len(path)) for name in ("gamma", "moment", "energy")]
+    columns = [path.gamma, path.moment, path.energy, *errors]
+    return Curve(
+        case,
+        np.array(columns, dtype=float).T[:n] + 0.0,  # no -0.0
+        tuple(point for point in path.points if point.position < n),
+        path.mode,
+        path.shapes,
+    )
+
+
+def solved(cases: Iterable[Case]) -> list[Curve]:
+    """The curves of the cases, with states enough to be drawn."""
+    return [curve_of(case, case.solve()) for case in cases]
+
+
+def smooth(curve: Curve) -> Array:
+    """Points (gamma, moment, energy), (m, 3), of a smooth curve through all states.
+
+    The cubic spline over the chord length in all three, which turns with the path through folds.
+    """
+    values = curve.states[:, :3]
+    values = values[np.append(True, np.diff(_chord(values)) > SAME)]
+    chord = _chord(values)
+    place = np.arange(PER * (len(chord) - 1) + 1) / PER
+    points: Array = CubicSpline(chord, values)(np.interp(place, np.arange(len(chord)), chord))
+    return points
+
+
+def _chord(values: Array) -> Array:
+    """Length up to every point, every column over its range."""
+    span = np.ptp(values, axis=0)
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(values / span, axis=0), axis=1)))
+
+
+def plain(words: str) -> str:
+    """Words without mathtext."""
+    words = words.replace("°", " degrees").replace("\\sqrt{3}", "sqrt(3)")
+    return " ".join(words.replace("$", "").replace("\\", "").split())
+
+
+def in_words(mode: Mode | None) -> str:
+    """The folding mode in the paper's words: "stable, snap-back"."""
+    if mode is None:
+        return "ends before $\\pi$"
+    if not mode.foldable:
+        return "un-foldable"
+    snapping = "no snap" if mode.snapping == "none" else mode.snapping
+    return f"{'stable' if mode.stable else 'unstable'}, {snapping}"
+
+
+# --- Tables ----------------------------------------------------------------------------------
+
+
+def write_curves(file: FilePath, about: str, curves: Iterable[Curve]) -> File:
+    """Write the table of all states of the curves; return the file."""
+    rows = []
+    curves = list(curves)
+    for curve in curves:
+        kinds = {point.position: point.kind for point in curve.points}
+        for k, state in enumerate(curve.states.tolist()):
+            rows.append([*curve.case.entries(), *map(repr, state), kinds.get(k, "")])
+    return _write(file, about, curves, STATE_COLUMNS | POINT_COLUMN, rows)
+
+
+def write_shapes(file: FilePath, about: str, shots: Iterable[tuple[Curve, int]]) -> File:
+    """Write the table of the ring in some states (curve, position); return the file."""
+    shots = list(shots)
+    place = ("r1", "r2", "r3", "d11", "d12", "d13")
+    columns = STATE_COLUMNS | {
+        "arc_length": "of the vertex from the first grip [a]",
+        **dict.fromkeys(
+            place[:3], "position of the vertex along E1 or E2 or E3 (twisting axis) [a]"
+        ),
+        **dict.fromkeys(place[3:], "component of the director d1, along the section's height"),
+    }
+    rows = []
+    for curve, k in shots:
+        x, d1 = at_vertices(curve, k)
+        frames = sites(curve.case.ring, len(x), "full")
+        s = 0.5 * (frames[:-1] + frames[1:])
+        state = list(map(repr, curve.states[k].tolist()))
+        rows += [
+            [*curve.case.entries(), *state, *map("{:.10g}".format, row)]
+            for row in np.column_stack([s, x, d1]).tolist()
+        ]
+    return _write(file, about, [curve for curve, _ in shots], columns, rows)
+
+
+def at_vertices(curve: Curve, k: int) -> tuple[Array, Array]:
+    """Vertices and the directors d1 there, (N, 3) each, of a state with shapes."""
+    if curve.shapes is None:
+        raise ValueError(f"curve must have shapes to be drawn, got none for {curve.case.name!r}")
+    d1 = curve.shapes.frames[k, :, 0]
+    d1 = d1 + np.roll(d1, -1, axis=0)  # vertex j joins edges j and j + 1
+    return curve.shapes.x[k], d1 / np.linalg.norm(d1, axis=1, keepdims=True)
+
+
+def _write(
+    file: FilePath,
+    about: str,
+    curves: Sequence[Curve],
+    columns: Mapping[str, str],
+    rows: Iterable[Sequence[str]],
+) -> File:
+    """Write a table: lines of words that begin with #, the columns' names, and the rows."""
+    columns = {"case": "which curve", **RING_COLUMNS, **columns}
+    modes = {curve.case.name: plain(in_words(curve.mode)) for curve in curves}
+    text = io.StringIO(newline="")
+    text.write(f"# {about}\n")
+    text.write("# " + "; ".join(f"{name}: {words}" for name, words in columns.items()) + "\n")
+    text.write("# modes: " + "; ".join(f"{name}: {mode}" for name, mode in modes.items()) + "\n")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(columns)
+    table.writerows(rows)
+    content = text.getvalue().encode()
+    write_whole(file, lambda opened: opened.write(content))
+    return File(file)

@@ -1,0 +1,100 @@
+"""The circle's moment over twist and section: curves on the surface that they sweep."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from der.geometry.ring import circle
+from der.paper import canvas
+from der.paper.cases import Array, Case, Curve, smooth, solved, write_curves
+from der.utils.files import FilePath
+
+if TYPE_CHECKING:
+    from der.paper.canvas import Axes
+
+SHOWN = (1.0, 1.51, 1.6, 1.84, 2.0, 3.47, 4.0, 8.0)  # h/t
+# Here the first fold sits at pi: the path of a less flat section ends there, of a flatter one
+# turns back and goes on to the folded ring. So the surface has two sheets that meet at one edge.
+FOLDABLE_FROM = 1.507577
+NEAR = 1e-4  # of h/t, how close the sheets come to that edge
+ALONG = 121  # points along each path
+TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+
+
+def fig2b(folder: FilePath) -> list[File]:
+    """Moment of circles over gamma and h/t, and the curves by themselves."""
+    curves = solved(Case(f"$h/t$ = {h:g}", circle(), h, "curve") for h in SHOWN)
+    sheets = [
+        solved(Case(f"$h/t$ = {h:.6g}", circle(), h, "surface") for h in values)
+        for values in (
+            np.linspace(1.0, FOLDABLE_FROM - NEAR, 10),
+            np.geomspace(FOLDABLE_FROM + NEAR, 8.0, 30),
+        )
+    ]
+    colours = canvas.sequence(len(curves))
+    figure = canvas.page(10.0, 4.9)
+    _draw_manifold(canvas.page_3d(figure, (-0.02, 0.03, 0.51, 1.02)), sheets, curves, colours)
+    _draw_flat(figure.add_axes((0.585, 0.305, 0.40, 0.665)), curves, colours)
+    canvas.legend_of_marks(figure, curves)
+    table = [*curves, *sheets[0], *sheets[1]]
+    about = "fig2b: moment of circles (a = R); curves shown, and those that make the surface"
+    return [
+        canvas.save(figure, File(folder) / "fig2b.png"),
+        write_curves(File(folder) / "fig2b.csv", about, table),
+    ]
+
+
+def _draw_manifold(
+    panel: Any, sheets: list[list[Curve]], curves: list[Curve], colours: list[Any]
+) -> None:
+    """Draw the surface and the curves on it, on an Axes3D."""
+    for sheet in sheets:
+        gamma, moment = np.array([_resampled(curve) for curve in sheet]).transpose(2, 0, 1)
+        h_over_t = np.array([[curve.case.h_over_t] * ALONG for curve in sheet])
+        panel.plot_surface(
+            gamma,
+            np.log(h_over_t),
+            moment,
+            rcount=len(sheet),
+            ccount=ALONG,
+            color="#d9e4ef",
+            alpha=0.6,
+            linewidth=0,
+            lightsource=canvas.light(azimuth=300, elevation=45),
+            zorder=1,
+        )
+    for curve, colour in zip(curves, colours, strict=True):
+        points = smooth(curve)
+        level = np.full(len(points), math.log(curve.case.h_over_t))
+        panel.plot(points[:, 0], level, points[:, 1], color=colour, linewidth=1.7, zorder=3)
+    panel.set_xticks(*canvas.quarters(math.pi))
+    panel.set_yticks(np.log(TICKS), [f"{tick:g}" for tick in TICKS])
+    panel.set_xlim(0, math.pi)
+    panel.set_ylim(0, math.log(8.0))
+    panel.set_xlabel("$\\gamma$", fontsize=10, color=canvas.INK)
+    panel.set_ylabel("$h/t$ (logarithmic)", fontsize=9, color=canvas.INK)
+    panel.set_zlabel("$M\\,R/GJ$", fontsize=10, color=canvas.INK)
+    panel.tick_params(labelsize=8, pad=0, labelcolor=canvas.INK)
+    panel.view_init(elev=28, azim=-58)
+    panel.set_box_aspect((1.25, 1.35, 0.85), zoom=0.95)
+
+
+def _draw_flat(panel: Axes, curves: list[Curve], colours: list[Any]) -> None:
+    """Draw the curves against gamma."""
+    for curve, colour in zip(curves, colours, strict=True):
+        canvas.draw_curve(panel, curve, canvas.MOMENT, colour, canvas.labelled(curve))
+    canvas.dress(panel, canvas.MOMENT, "R")
+    canvas.legend(panel, fontsize=7.5, columnspacing=0.8)
+
+
+def _resampled(curve: Curve) -> Array:
+    """Points (gamma, moment) of a curve, evenly spread over its length in the panel."""
+    points = smooth(curve)[:, :2]
+    steps = np.diff(points, axis=0) / (math.pi, 2.5)
+    way = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
+    even = np.linspace(0.0, way[-1], ALONG)
+    return np.column_stack([np.interp(even, way, column) for column in points.T])

@@ -1,0 +1,308 @@
+"""The paper's figures of packing ratios, each as a picture and as a table of its numbers.
+
+matplotlib is imported inside functions only; figures are objects of their own, so that nothing
+global changes and no display is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from der.bvp.folded_shape import folded
+from der.bvp.packing import packing_ratio
+from der.geometry.ring import Ring, ellipse, rectangle, triangle
+from der.utils.files import FilePath, write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+DPI = 200
+MAP_POINTS = 720  # on a ring of a map: packing ratios to about 1e-7
+SHAPE_POINTS = 600
+INK, QUIET = "#222222", "#8a8a8a"
+FOLDED, FLAT = "#0072B2", "#bdbdbd"  # blue of Okabe and Ito
+LETTERS = "ABCDEFGH"
+# of contours of fig. 9: away from the jump
+LABELS = (
+    (38, 0.28),
+    (38, 0.24),
+    (38, 0.16),
+    (36, 0.09),
+    (76, 0.19),
+    (76, 0.16),
+    (76, 0.11),
+    (76, 0.05),
+)
+ELLIPSES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0)  # b/a of the insets
+RECTANGLES = (  # (b/a, r/a)
+    (0.2, 0.1),
+    (0.2, 0.2),
+    (0.6, 0.1),
+    (0.6, 0.3),
+    (0.6, 0.6),
+    (1.0, 0.1),
+    (1.0, 0.5),
+    (1.0, 1.0),
+)
+TRIANGLES = (  # (vertex angle in degrees, r/a)
+    (30.0, 0.033),
+    (30.0, 0.2),
+    (30.0, 0.35),
+    (60.0, 0.05),
+    (60.0, 0.2),
+    (90.0, 0.033),
+    (90.0, 0.15),
+    (120.0, 1 / 30),
+)
+
+
+def fig3b(folder: FilePath, columns: int = 51) -> list[Path]:
+    """Write the packing ratio of ellipses against b/a in [0.5, 1], fig3b.png and fig3b.csv.
+
+    Parameters
+    ----------
+    folder : path
+        An existing folder.
+    columns : int
+        Number of ellipses, at least 2.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    ValueError
+        If `columns` is less than 2.
+    OSError
+        If a file cannot be written; none is left half written.
+    """
+    b = np.linspace(0.5, 1.0, _checked(columns))
+    ratio = np.array([packing_ratio(ellipse(c), MAP_POINTS) for c in b])
+    figure = _curve_figure(b, ratio)
+    return _written(folder, "fig3b", figure, {"b_over_a": b, "packing_ratio": ratio})
+
+
+def fig6(folder: FilePath, columns: int = 49) -> list[Path]:
+    """Write the packing ratio of rectangles over (b/a, r/a), fig6.png and fig6.csv.
+
+    Parameters and errors are those of `fig3b`; the map has two rows for five columns.
+    """
+    b, share = _grid(0.2, 1.0, columns)
+    r = 0.1 + share * (b - 0.1)
+    ratio = np.vectorize(lambda b, r: packing_ratio(rectangle(b, r), MAP_POINTS))(b, r)
+    marks = [_Mark((c, r), rectangle(c, r), f"{c:.2g}, {r:.2g}") for c, r in RECTANGLES]
+    figure = _map_figure(b, r, ratio, marks, "$b/a,\\ r/a$")
+    axes = figure.axes[0]
+    axes.set_xlabel("aspect ratio  $b/a$", fontsize=10, color=INK)
+    axes.set_ylabel("fillet radius  $r/a$", fontsize=10, color=INK)
+    axes.text(0.27, 0.72, "$r > b$: no such ring", fontsize=8.5, color=QUIET)
+    columns_of = {"b_over_a": b, "r_over_a": r, "packing_ratio": ratio}
+    return _written(folder, "fig6", figure, columns_of)
+
+
+def fig9(folder: FilePath, columns: int = 22) -> list[Path]:
+    """Write the packing ratio of triangles over (vertex angle, r/a), fig9.png and fig9.csv.
+
+    Parameters and errors are those of `fig3b`; the map has two rows for five columns. With
+    small fillets the folded shape of least energy, and so the ratio, jumps between 50 and 60
+    degrees, where columns are closer.
+    """
+    share_across, share = _grid(0.0, 1.0, columns)
+    degrees = np.interp(share_across, [0.0, 0.3, 0.6, 1.0], [30.0, 50.0, 60.0, 120.0])
+    inscribed = np.tan(np.pi / 4 - np.radians(degrees) / 4) / 2
+    r = 0.033 + share * (inscribed - 0.033)
+    ratio = np.vectorize(lambda d, r: packing_ratio(triangle(math.radians(d), r), MAP_POINTS))(
+        degrees, r
+    )
+    marks = [
+        _Mark((d, r), triangle(math.radians(d), r), f"{d:.0f}°, {r:.2g}") for d, r in TRIANGLES
+    ]
+    figure = _map_figure(degrees, r, ratio, marks, "$\\alpha_T,\\ r/a$", LABELS)
+    axes = figure.axes[0]
+    axes.set_xlabel("vertex angle  $\\alpha_T$  (degrees)", fontsize=10, color=INK)
+    axes.set_ylabel("fillet radius  $r/a$", fontsize=10, color=INK)
+    axes.set_xticks(range(30, 121, 15))
+    axes.text(84, 0.29, "$r > R_C$: no such ring", fontsize=8.5, color=QUIET)
+    columns_of = {"vertex_angle": degrees, "r_over_a": r, "packing_ratio": ratio}
+    return _written(folder, "fig9", figure, columns_of)
+
+
+class _Mark(NamedTuple):
+    """A ring whose folded shape is shown beside a map."""
+
+    at: tuple[float, float]
+    ring: Ring
+    label: str
+
+
+def _checked(columns: object) -> int:
+    if isinstance(columns, bool) or not isinstance(columns, int) or columns < 2:
+        raise ValueError(f"columns must be a whole number >= 2, got {columns!r}")
+    return columns
+
+
+def _grid(first: float, last: float, columns: object) -> tuple[Array, Array]:
+    """Return the abscissa, and the share of the ordinate's range, of every point of a map."""
+    n = _checked(columns)
+    across, share = np.meshgrid(np.linspace(first, last, n), np.linspace(0, 1, 2 + 2 * n // 5))
+    return across, share
+
+
+def _written(folder: FilePath, name: str, figure: Figure, table: dict[str, Array]) -> list[Path]:
+    """Write the picture and its numbers."""
+    png, csv = Path(folder) / f"{name}.png", Path(folder) / f"{name}.csv"
+    rows = np.column_stack([np.ravel(column) for column in table.values()])
+    header = ",".join(table)
+    write_whole(
+        csv,
+        lambda file: np.savetxt(file, rows, "%.10g", ",", header=header, comments=""),
+    )
+    write_whole(png, lambda file: figure.savefig(file, format="png"))
+    return [png, csv]
+
+
+# --- Pictures --------------------------------------------------------------------------------
+
+
+def _new_figure(width: float, height: float) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _curve_figure(b: Array, ratio: Array) -> Figure:
+    """Packing ratio against b/a, below the folded shapes of some ellipses."""
+    figure = _new_figure(6.6, 4.6)
+    axes = figure.add_axes((0.11, 0.12, 0.86, 0.56))
+    axes.plot(b, ratio, color=FOLDED, linewidth=1.8, zorder=2)
+    axes.axhline(1 / 9, color=QUIET, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+    axes.text(0.5, 1 / 9 + 0.004, "circle, 1/9", fontsize=8.5, color=QUIET, va="bottom")
+    axes.set_xlim(0.46, 1.04)
+    axes.set_ylim(0.08, 0.32)
+    axes.set_xlabel("aspect ratio  $b/a$", fontsize=10, color=INK)
+    axes.set_ylabel("packing ratio", fontsize=10, color=INK)
+    _plain(axes)
+    for c in ELLIPSES:
+        ring = ellipse(c)
+        height = packing_ratio(ring, MAP_POINTS)
+        axes.vlines(c, height, 0.32, color=QUIET, linewidth=0.6, linestyle=(0, (1, 2)), zorder=1)
+        axes.plot(c, height, **_dot())
+        centre = 0.11 + 0.86 * (c - 0.46) / 0.58
+        inset = figure.add_axes((centre - 0.069, 0.72, 0.138, 0.2))
+        _draw_shapes(inset, ring)
+        figure.text(centre, 0.955, f"{height:.3f}", ha="center", fontsize=9, color=INK)
+    figure.text(0.012, 0.955, "ratio", fontsize=9, color=QUIET)
+    return figure
+
+
+def _map_figure(
+    x: Array,
+    y: Array,
+    ratio: Array,
+    marks: Sequence[_Mark],
+    what: str,
+    labels_at: Sequence[tuple[float, float]] = (),
+) -> Figure:
+    """Contours of the packing ratio, beside the folded shapes of the rings that are marked."""
+    figure = _new_figure(9.2, 4.9)
+    axes = figure.add_axes((0.065, 0.115, 0.465, 0.835))
+    highest = float(np.max(ratio))
+    levels = np.append(np.arange(4, 12) / 40, np.arange(6, 20 * highest + 1) / 20)
+    named = [
+        v for v in levels[1:] if v < highest - 0.1 and round(40 * v) % (2 if v < 0.3 else 4) == 0
+    ]
+    filled = axes.contourf(x, y, ratio, levels=levels, cmap="viridis")
+    lines = axes.contour(x, y, ratio, levels=levels[1:], colors="white", linewidths=0.5)
+    axes.clabel(lines, named, fmt="%.3g", fontsize=7, manual=labels_at or False)
+    for values, limit in ((x, axes.set_xlim), (y, axes.set_ylim)):
+        low, high = float(np.min(values)), float(np.max(values))
+        limit(low - 0.04 * (high - low), high + 0.04 * (high - low))
+    _plain(axes)
+    bar = figure.colorbar(filled, cax=figure.add_axes((0.545, 0.115, 0.014, 0.835)))
+    bar.set_ticks([v for v in levels if round(40 * v) % 4 == 0])
+    bar.set_label("packing ratio", fontsize=10, color=INK)
+    bar.ax.tick_params(labelsize=8.5, labelcolor=INK, color=QUIET)
+    bar.outline.set_visible(False)
+    for k, mark in enumerate(marks):
+        axes.plot(*mark.at, clip_on=False, **_dot())
+        _letter(axes, mark.at, LETTERS[k], is_last=mark.at[0] == np.max(x))
+        left, bottom = 0.635 + 0.182 * (k % 2), 0.745 - 0.233 * (k // 2)
+        inset = figure.add_axes((left, bottom, 0.175, 0.165))
+        _draw_shapes(inset, mark.ring)
+        value = packing_ratio(mark.ring, MAP_POINTS)
+        caption = rf"$\bf{{{LETTERS[k]}}}$  {mark.label}:  {value:.2f}"
+        figure.text(left + 0.0875, bottom + 0.18, caption, ha="center", fontsize=8.5, color=INK)
+    figure.text(
+        0.8135,
+        0.972,
+        f"ring ({what}): packing ratio",
+        ha="center",
+        va="center",
+        fontsize=8.5,
+        color=QUIET,
+    )
+    return figure
+
+
+def _draw_shapes(axes: Axes, ring: Ring) -> None:
+    """Draw the folded ring inside its flat outline, in one scale, about one centre."""
+    s = np.linspace(0.0, ring.length, SHAPE_POINTS + 1)
+    flat = ring.position(s)[:, 1:]
+    points = folded(ring, SHAPE_POINTS).points
+    points = np.append(points, points[:1], axis=0)
+    for curve, colour, width in ((flat, FLAT, 0.9), (points, FOLDED, 1.1)):
+        middle = (curve.min(axis=0) + curve.max(axis=0)) / 2
+        axes.plot(*(curve - middle).T, color=colour, linewidth=width)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def _plain(axes: Axes) -> None:
+    axes.tick_params(labelsize=8.5, color=QUIET, labelcolor=INK, direction="in")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(QUIET)
+
+
+def _dot() -> dict[str, Any]:
+    return {
+        "marker": "o",
+        "markersize": 4.5,
+        "markerfacecolor": "white",
+        "markeredgecolor": INK,
+        "markeredgewidth": 0.9,
+        "linestyle": "none",
+        "zorder": 4,
+    }
+
+
+def _letter(axes: Axes, at: tuple[float, float], letter: str, *, is_last: bool) -> None:
+    """Write a letter beside a point, to its left where the point is the last of the map."""
+    from matplotlib.patheffects import withStroke
+
+    axes.annotate(
+        letter,
+        at,
+        xytext=(-7.5 if is_last else 6.5, 6.5),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=9,
+        fontweight="bold",
+        color=INK,
+        zorder=5,
+        path_effects=[withStroke(linewidth=2.2, foreground="white")],
+    )

@@ -1,0 +1,177 @@
+"""The full ring at every state of a path, and what a playback shows besides.
+
+Free of kernels, like the record that they belong to; they are saved by themselves, as npz.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from der.utils import checks
+from der.utils.checks import Array
+from der.utils.files import FilePath, write_whole
+
+
+@dataclass(frozen=True, eq=False)
+class Fall:
+    """How the ring falls in a snap: configurations in their order, none of them an equilibrium.
+
+    Raises
+    ------
+    ValueError
+        If a shape is another or a value is not finite.
+    """
+
+    after: int  # position in the path of the state that it leaves
+    gamma: Array  # (k,) rad
+    energy: Array  # (k,) GJ/a, of the full ring
+    x: Array  # (k, N, 3) vertices, a
+    frames: Array  # (k, N, 3, 3) material frames of the edges, rows d1, d2, d3
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "after", checks.count("after of a fall", self.after))
+        k, n_v, _ = _keep(self, "x of a fall", "x", ("k", "N", 3)).shape
+        _keep(self, "frames of a fall", "frames", (k, n_v, 3, 3))
+        for name in ("gamma", "energy"):
+            _keep(self, f"{name} of a fall", name, (k,))
+
+
+@dataclass(frozen=True, eq=False)
+class Softest:
+    """The softest mode of each symmetry class at every state, and the ring displaced by one.
+
+    Raises
+    ------
+    ValueError
+        If a shape is another or a value is not finite.
+    """
+
+    classes: tuple[str, ...]  # (m,) names
+    eigenvalues: Array  # (n, m) stiffness per length, GJ/a^2
+    u: Array  # (n, N, 3) displacements of the vertices in the softest of these modes, any scale
+
+    def __post_init__(self) -> None:
+        classes = checks.each("classes of the modes", self.classes, checks.text)
+        object.__setattr__(self, "classes", tuple(classes))
+        n, _, _ = _keep(self, "u of the modes", "u", ("n", "N", 3)).shape
+        _keep(self, "eigenvalues of the modes", "eigenvalues", (n, len(classes)))
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """The full ring at every state of a path.
+
+    Parameters
+    ----------
+    x : (n, N, 3) array
+        Vertex positions, a.
+    frames : (n, N, 3, 3) array
+        Material frames, per edge; rows d1, d2, d3.
+    falls : how the ring falls in its snaps, where that was kept.
+    softest : its softest modes, where they were asked for.
+    arc_length : (N,) array
+        Arc lengths of the frames from the first grip, a; None where they are evenly spaced.
+
+    Raises
+    ------
+    ValueError
+        If a shape is another or a value is not finite, or a fall leaves a state that is not there.
+    """
+
+    x: Array
+    frames: Array
+    falls: tuple[Fall, ...] = ()
+    softest: Softest | None = None
+    arc_length: Array | None = None
+
+    def __post_init__(self) -> None:
+        n, n_v, _ = _keep(self, "x", "x", ("n", "N", 3)).shape
+        _keep(self, "frames", "frames", (n, n_v, 3, 3))
+        if self.arc_length is not None:
+            _keep(self, "arc_length", "arc_length", (n_v,))
+        object.__setattr__(self, "falls", tuple(self.falls))
+        for fall in self.falls:
+            if fall.x.shape[1] != n_v:
+                raise ValueError(f"a fall must be of {n_v} vertices, got {fall.x.shape[1]}")
+            if fall.after >= n:
+                raise ValueError(f"after of a fall must be a state, below {n}, got {fall.after}")
+        if self.softest is not None and self.softest.u.shape != self.x.shape:
+            raise ValueError(
+                f"u of the modes must have shape {self.x.shape}, got {self.softest.u.shape}"
+            )
+
+    def save(self, path: FilePath) -> None:
+        """Write npz, whole or not at all.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written; one already there is then unharmed.
+        """
+        arrays = {"x": self.x, "frames": self.frames}
+        if self.arc_length is not None:
+            arrays["arc_length"] = self.arc_length
+        if self.softest is not None:
+            arrays |= _named("softest", self.softest)
+        for k, fall in enumerate(self.falls):
+            arrays |= _named(f"falls/{k}", fall)
+        write_whole(path, lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path: FilePath) -> Shapes:
+        """Shapes of an npz file.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If it is broken or not such a file.
+        """
+        with open(path, "rb") as file:
+            try:
+                with np.load(file, allow_pickle=False) as npz:
+                    arrays = {name: npz[name] for name in npz.files}
+                x, frames, places = arrays["x"], arrays["frames"], arrays.get("arc_length")
+                falls, modes = _falls(arrays), _softest(arrays)
+            except Exception as problem:  # zipfile and numpy raise some ten classes on broken files
+                raise ValueError(f"{os.fspath(path)}: no shapes.npz as --out writes") from problem
+        try:
+            return cls(x, frames, falls, modes, places)
+        except ValueError as problem:
+            raise ValueError(f"{os.fspath(path)}: {problem}") from problem
+
+
+def _keep(record: object, called: str, name: str, shape: tuple[int | str, ...]) -> Array:
+    """Replace an array of a frozen record by its checked copy, read-only."""
+    array = checks.checked_array(called, getattr(record, name), shape)
+    array.setflags(write=False)
+    object.__setattr__(record, name, array)
+    return array
+
+
+def _named(prefix: str, record: Fall | Softest) -> dict[str, Array]:
+    """The entries of a record as arrays of the file."""
+    return {f"{prefix}/{name}": np.asarray(value) for name, value in vars(record).items()}
+
+
+def _falls(arrays: Mapping[str, Array]) -> tuple[Fall, ...]:
+    """The falls in a file."""
+    names = [entry.name for entry in fields(Fall)]
+    found: list[Fall] = []
+    while f"falls/{len(found)}/x" in arrays:
+        entries = {name: arrays[f"falls/{len(found)}/{name}"] for name in names}
+        found.append(Fall(**entries | {"after": entries["after"].item()}))  # type: ignore[arg-type]
+    return tuple(found)
+
+
+def _softest(arrays: Mapping[str, Array]) -> Softest | None:
+    """The softest modes in a file, if there are any."""
+    if "softest/u" not in arrays:
+        return None
+    entries = {entry.name: arrays[f"softest/{entry.name}"] for entry in fields(Softest)}
+    return Softest(**entries | {"classes": entries["classes"].tolist()})

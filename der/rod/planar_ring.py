@@ -1,0 +1,169 @@
+"""A ring in its plane as a discrete rod: rods, states of other rings to start from, shapes.
+
+States are symmetric about the twisting axis, as every ring is. A planar closed elastica of uniform
+natural curvature is a circle, covered T times, or a figure eight, in any place along the ring; of
+another ring these are what it is led to as the natural curvature is changed into its own, and an
+eight stays where one of its two axes of symmetry lies on the ring's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from der.geometry.mesh import sites
+from der.geometry.ring import Ring
+from der.kernels.planar import Array, PlanarRod
+from der.records.configurations import Shapes
+from der.scene import Scene
+
+_UNIFORM = 1e-9  # rad: turnings and cells that are equal
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarRing:
+    """The mesh of a ring in its plane; its one stiffness, EI1, is 1 here."""
+
+    ring: Ring
+    places: Array  # (N + 1,) arc lengths of the frames, the first at both ends
+    cell: Array  # (N,) between them
+    length: Array  # (N,) of the edges
+    rest: Array  # (N,) natural turning, rad
+
+    @property
+    def n_edges(self) -> int:
+        """Edges of the ring."""
+        return len(self.cell)
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all parts of it are alike."""
+        return bool(np.ptp(self.rest) < _UNIFORM and np.ptp(self.cell) < _UNIFORM)
+
+    @property
+    def natural(self) -> Array:
+        """Tangent angles (N,) of the ring cut open and freed of stress, 0 at the first grip."""
+        return np.append(0.0, np.cumsum(self.rest[:-1]))
+
+    @property
+    def share(self) -> Array:
+        """Arc lengths (N,) of the frames, of the whole."""
+        return self.places[:-1] / self.places[-1]
+
+    def way(self) -> Array:
+        """Weights (N,) of edges whose sum leads from one point of the twisting axis to the other.
+
+        That is from the middle of edge 0 to that of edge N/2.
+        """
+        half = self.n_edges // 2
+        weight = np.zeros(self.n_edges)
+        weight[1:half] = 1.0
+        weight[0] = 0.5 * self.cell[0] / self.length[0]
+        weight[half] = 0.5 * self.cell[half - 1] / self.length[half]
+        return weight
+
+    def rod(self, turning: int, rest: Array | None = None, rate: Array | None = None) -> PlanarRod:
+        """The ring left alone, closed after ``turning`` turns.
+
+        Parameters
+        ----------
+        rest, rate : (N,) natural turning at load 0, and its change per unit of load; its own.
+        """
+        n = self.n_edges
+        free = np.ones(n, dtype=bool)
+        free[0] = False
+        return PlanarRod(
+            1.0 / self.cell,
+            self.rest if rest is None else rest,
+            np.zeros(n) if rate is None else rate,
+            2.0 * math.pi * turning,
+            self.length,
+            np.zeros(n),
+            self.length / self.length.sum(),
+            np.ones((1, n)),
+            free,
+        )
+
+    def strutted(self) -> PlanarRod:
+        """The flat ring with a strut between its points on the axis; the load is its length.
+
+        The strut is one more edge, which nothing bends, and turns as it likes.
+        """
+        body, n = self.rod(1), self.n_edges
+        strut = np.zeros(n + 1)
+        strut[-1] = 1.0
+        return body._replace(
+            length=np.append(body.length, 0.0),
+            reach=strut,
+            mass=np.append(body.mass, 0.0),  # how a strut turns is no distance along a path
+            weight=np.array([1.0 - strut, np.append(self.way(), -1.0)]),
+            free=np.append(body.free, True),
+        )
+
+    def positions(self, phi: Array) -> Array:
+        """Vertices (N, 2) of the ring with tangents at ``phi``: across the axis, and along it.
+
+        The first grip lies on the axis, with the second as far up as the first is down.
+        """
+        edges = self.length[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
+        x = np.cumsum(edges, axis=0) - edges[0] + 0.5 * self.cell[0] / self.length[0] * edges[0]
+        up = float((self.way() @ edges)[1])
+        return np.asarray(x - [0.0, 0.5 * up])
+
+
+def planar_ring(scene: Scene, n_edges: int | None = None) -> PlanarRing:
+    """The ring of a scene on its mesh, or on a coarser one."""
+    n = scene.n_edges if n_edges is None else n_edges
+    places = sites(scene.ring, n, "full")
+    cell = np.diff(places)
+    rest = np.diff(scene.ring.natural_angle(places))
+    length = 0.5 * (cell + np.roll(cell, 1))
+    return PlanarRing(scene.ring, places, cell, length, rest)
+
+
+def covered(mesh: PlanarRing, turning: int) -> Array:
+    """Tangent angles (N,) of the ring bent evenly until it turns ``turning`` times."""
+    more = 2.0 * math.pi * turning - float(mesh.rest.sum())
+    return mesh.natural + more * mesh.share
+
+
+def eight(mesh: PlanarRing, shift: float) -> Array:
+    """Tangent angles (N,) of a figure eight; ``shift`` in turns, 0 and 1/4 are symmetric.
+
+    Notes
+    -----
+    sin(theta/2) = k sn(u), one period of 4 K(k) to the length, 2 E(k) = K(k) (Love 1927, 263);
+    at u = 0 the strands cross, at u = K they are bent most.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ellipe, ellipj, ellipk
+
+    m = float(brentq(lambda m: 2.0 * ellipe(m) - ellipk(m), 0.5, 0.95, xtol=1e-15))
+    places = np.append(shift, shift + mesh.share)
+    theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * places, m)[0])
+    return np.asarray(theta[1:] - theta[0])
+
+
+def shifted(mesh: PlanarRing, phi: Array) -> Array:
+    """Rates (N,) at which tangents turn when material shifts along the curve, edge 0 held."""
+    turn = (np.roll(phi, -1) - phi) / mesh.cell
+    turn[-1] = (phi[0] - phi[-1] + 2.0 * math.pi * round((phi[-1] - phi[0]) / (2.0 * math.pi))) / (
+        mesh.cell[-1]
+    )
+    rate = 0.5 * (turn + np.roll(turn, 1))
+    return np.asarray(rate - rate[0])
+
+
+def shapes(mesh: PlanarRing, angles: list[Array]) -> Shapes:
+    """Vertices and frames in space: the ring lies in (E2, E3), d1 is E1, d2 points outwards."""
+    x = np.zeros((len(angles), mesh.n_edges, 3))
+    frames = np.zeros((len(angles), mesh.n_edges, 3, 3))
+    frames[:, :, 0, 0] = 1.0
+    for k, phi in enumerate(angles):
+        x[k, :, 1:] = mesh.positions(phi)
+        cosine, sine = np.cos(phi), np.sin(phi)
+        frames[k, :, 1, 1], frames[k, :, 1, 2] = sine, -cosine
+        frames[k, :, 2, 1], frames[k, :, 2, 2] = cosine, sine
+    return Shapes(x, frames, arc_length=mesh.places[:-1])

@@ -1,0 +1,396 @@
+"""Dynamic relaxation: a rod moves, is stopped at every peak of kinetic energy, and comes to rest.
+
+Fictitious masses turn the search for a minimum of the energy into motion in unit time steps
+(Day 1965; Barnes 1999; Papadrakakis 1981). No matrix of the whole rod is formed or factored: a step
+needs the gradient, one block of mass an edge, and an m x m system for m <= 5 position conditions.
+
+    masses      as light as the unit step allows (`masses`), times a margin; a rod that gains
+                energy all the same gets heavier
+    conditions  constraint forces keep accelerations on them, and the velocity of each step takes
+                back, in the metric of the masses, what the last one strayed
+    damping     kinetic: where the kinetic energy has passed a peak, the rod goes back to the middle
+                of the last step and starts again from rest (Barnes 1999)
+
+In the rotations of frames bending and twisting are of second order in arc length, so the number of
+steps grows like the number of edges; in positions it would grow like its square.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from der.kernels.forces import Motion, clear, conditions, gradient, no_pull
+from der.kernels.masses import Masses, condition_metric, solve_metric, weigh
+from der.kernels.quaternions import Array, into_frame, turned
+from der.rod.equilibrium import Direction, moved
+from der.rod.rod import Rod, State
+from der.rod.supports import Supports
+
+_MARGIN = 1.2  # of the masses above the lightest stable ones; 1.05 to 1.5: -10 to +70 % of the cost
+_HEAVIER = 1.5  # factor on the masses of a rod that has gained energy
+_GAIN = 1e-9  # of the energy: less is rounding and the second order of the conditions
+_CLOSED = 1e-6  # a; a larger gap is closed before the motion starts
+_PROJECTIONS = 20
+_SLOTS = 2048  # of the album: a longer film is thinned out
+
+
+class Rest(IntEnum):
+    """How a relaxation ended."""
+
+    AT_REST = 0
+    TOO_MANY_EVALUATIONS = 1
+    DIVERGED = 2
+    BENT_TOO_FAR = 3
+    AT_STOP = 4
+
+
+ADVICE = {
+    Rest.AT_REST: "at rest",
+    Rest.TOO_MANY_EVALUATIONS: "did not come to rest; allow more force evaluations",
+    Rest.DIVERGED: "the motion left all bounds; start closer to the conditions",
+    Rest.BENT_TOO_FAR: "turns or twists by more than 160 degrees; use more edges",
+    Rest.AT_STOP: "the load reached its stop",
+}
+
+
+class Aim(NamedTuple):
+    """What a relaxation is after, and what it may cost."""
+
+    frees_load: bool  # whether the load moves, under a dead moment
+    moment: float  # that moment, dL/dload
+    low: float  # stops of the load
+    high: float
+    tolerance: float  # of the residual; its square is that of the kinetic energy
+    most: int  # gradients
+    every: int  # k of the album; 0: none
+
+
+class Album(NamedTuple):
+    """Every k-th configuration of a relaxation, of a long one fewer; kernels write to it."""
+
+    quat: Array  # (slots, n, 4)
+    stretch: Array  # (slots, n)
+    load: Array  # (slots,)
+    energy: Array  # (slots,)
+
+
+class Ended(NamedTuple):
+    """What the kernel returns."""
+
+    outcome: int
+    where: int
+    evaluations: int
+    restarts: int
+    residual: float
+    kinetic: float
+    energy_start: float
+    energy: float
+    moment: float
+    kept: int
+
+
+@dataclass(frozen=True, slots=True)
+class Relaxed:
+    """A relaxation; where ``outcome`` is not AT_REST (or AT_STOP), its last configuration."""
+
+    state: State
+    outcome: Rest
+    where: int  # vertex that is bent too far; -1: none
+    evaluations: int  # of the gradient
+    restarts: int  # from rest, at peaks of the kinetic energy
+    residual: float  # largest entry of gradient and position gap, GJ/a and a
+    kinetic: float  # kinetic energy at the end, GJ/a
+    energy_start: float  # elastic energy of the rod as given, where it starts to move
+    energy: float  # and where it ends
+    moment: float  # dL/dload
+    history: tuple[State, ...]  # every k-th configuration, without multipliers
+    energies: Array  # (len(history),) elastic energies
+
+    @property
+    def rests(self) -> bool:
+        """Whether the end is an equilibrium, under given load or moment."""
+        return self.outcome is Rest.AT_REST
+
+
+@njit(cache=True)
+def _balance(held, masses, aim, pull):
+    """Add the forces that keep accelerations on the conditions; returns the largest residual.
+
+    F = -(B' M^-1 B)^-1 B' M^-1 grad.
+    """
+    n, b, m = pull.border.shape
+    largest = 0.0
+    condition_metric(masses, pull)
+    for k in range(m):
+        largest = max(largest, abs(pull.gap[k]))
+        of_load = masses.of_load[0] * (pull.load_grad[0] - aim.moment)
+        pull.force[k] = -of_load * pull.load_border[k]
+        for j in range(n):
+            for i in range(b):
+                pull.force[k] -= pull.lever[j, i, k] * pull.grad[j, i]
+    solve_metric(pull.metric, pull.force)
+    for k in range(m):
+        pull.load_grad[0] += pull.load_border[k] * pull.force[k]
+    if aim.frees_load:
+        largest = max(largest, abs(pull.load_grad[0] - aim.moment))
+    for j in range(n):
+        for i in range(b):
+            for k in range(m):
+                pull.grad[j, i] += pull.border[j, i, k] * pull.force[k]
+            if held.free[j, i] and not abs(pull.grad[j, i]) <= largest:  # true for NaN, too
+                largest = abs(pull.grad[j, i])
+    return largest
+
+
+@njit(cache=True)
+def _accelerate(pull, masses, moment, time, motion):
+    """Kinetic energy after ``time`` steps of acceleration, with the velocity on the conditions.
+
+    The velocity's part across the conditions is what takes back their gap in one step.
+    """
+    n, b, m = pull.border.shape
+    velocity, rate = motion.velocity, motion.rate
+    y = pull.gap.copy()
+    motion.last_rate[0] = rate[0]
+    rate[0] -= time * masses.of_load[0] * (pull.load_grad[0] - moment)
+    for k in range(m):
+        y[k] += pull.load_border[k] * rate[0]
+    for j in range(n):
+        for i in range(b):
+            motion.last[j, i] = velocity[j, i]
+            for r in range(b):
+                velocity[j, i] -= time * masses.inverse[j, i, r] * pull.grad[j, r]
+            for k in range(m):
+                y[k] += pull.border[j, i, k] * velocity[j, i]
+    solve_metric(pull.metric, y)
+    for k in range(m):
+        rate[0] -= masses.of_load[0] * pull.load_border[k] * y[k]
+    kinetic = 0.5 * rate[0] ** 2 / masses.of_load[0] if masses.of_load[0] > 0.0 else 0.0
+    for j in range(n):
+        for i in range(b):
+            for k in range(m):
+                velocity[j, i] -= pull.lever[j, i, k] * y[k]
+        for i in range(b):
+            for r in range(b):
+                kinetic += 0.5 * velocity[j, i] * masses.block[j, i, r] * velocity[j, r]
+    return kinetic
+
+
+@njit(cache=True)
+def _go(held, time, velocity, rate, motion):
+    """Move for ``time`` steps at a velocity."""
+    n, b = velocity.shape
+    w = np.empty(3)
+    for j in range(n):
+        if held.turn[j] != 0.0:
+            into_frame(motion.quat[j], held.turn_axis, w)
+            for i in range(3):
+                w[i] *= time * held.turn[j] * rate[0]
+        else:
+            for i in range(3):
+                w[i] = time * velocity[j, i]
+        turned(motion.quat[j], w, motion.quat[j])
+        if b == 4:
+            motion.stretch[j] += time * velocity[j, 3]
+    motion.load[0] += time * rate[0]
+
+
+@njit(cache=True)
+def _stop(motion):
+    clear(motion.velocity)
+    motion.rate[0] = 0.0
+
+
+@njit(cache=True)
+def _close(rod, held, masses, pull, motion):
+    """Move the rod onto its conditions, from rest to rest, by projections in the mass metric."""
+    for _ in range(_PROJECTIONS):
+        clear(pull.grad)
+        pull.load_grad[0] = 0.0
+        conditions(rod, held, motion, pull)
+        gap = 0.0
+        for k in range(pull.gap.shape[0]):
+            gap = max(gap, abs(pull.gap[k]))
+        if gap <= _CLOSED:
+            break
+        condition_metric(masses, pull)
+        _accelerate(pull, masses, 0.0, 0.0, motion)
+        _go(held, 1.0, motion.velocity, motion.rate, motion)
+        _stop(motion)
+
+
+@njit(cache=True)
+def _verdict(aim, residual, first, kinetic, load, bent_too_far, count):
+    """Value of `Rest` where the motion ends here; -1: it goes on."""
+    if not np.isfinite(residual) or residual > 1e3 * max(first, 1.0):
+        return 2
+    if bent_too_far >= 0:
+        return 3
+    if residual <= aim.tolerance and kinetic <= aim.tolerance * aim.tolerance:
+        return 0
+    if aim.frees_load and not aim.low < load < aim.high:
+        return 4
+    return 1 if count >= aim.most else -1
+
+
+@njit(cache=True)
+def _keep(motion, energy, slot, out_album):
+    """Copy a configuration to its place in the album."""
+    for j in range(motion.stretch.shape[0]):
+        for i in range(4):
+            out_album.quat[slot, j, i] = motion.quat[j, i]
+        out_album.stretch[slot, j] = motion.stretch[j]
+    out_album.load[slot] = motion.load[0]
+    out_album.energy[slot] = energy
+
+
+@njit(cache=True)
+def _thin(out_album):
+    """Keep every second configuration; returns how many."""
+    kept = (out_album.load.shape[0] + 1) // 2
+    for k in range(1, kept):
+        out_album.quat[k] = out_album.quat[2 * k]
+        out_album.stretch[k] = out_album.stretch[2 * k]
+        out_album.load[k] = out_album.load[2 * k]
+        out_album.energy[k] = out_album.energy[2 * k]
+    return kept
+
+
+@njit(cache=True)
+def _potential(energy, aim, motion, pull):
+    """What a motion spends: energy less the work of dead loads; gaps count to first order."""
+    potential = energy - pull.work[0] - aim.moment * motion.load[0]
+    for k in range(pull.gap.shape[0]):
+        potential += pull.force[k] * pull.gap[k]
+    return potential
+
+
+@njit(cache=True)
+def _relax(rod, held, aim, motion, pull, masses, album):
+    """Motion with kinetic damping until it ends; writes to all that follows ``aim``."""
+    heaviness, kinetic, at_rest = 0.5 * _MARGIN, 0.0, 0.0
+    count, restarts, kept, first, start = 0, 0, 0, 0.0, 0.0
+    every = aim.every
+    weigh(rod, held, motion, heaviness, aim.frees_load, masses)
+    _close(rod, held, masses, pull, motion)
+    while True:
+        energy, bent_too_far = gradient(rod, held, motion, pull)
+        residual = _balance(held, masses, aim, pull)
+        if count == 0:
+            first, start = residual, energy
+        if every > 0 and count % every == 0:
+            if kept == album.load.shape[0]:
+                kept, every = _thin(album), 2 * every
+            if count % every == 0:
+                _keep(motion, energy, kept, album)
+                kept += 1
+        count += 1
+        outcome = _verdict(aim, residual, first, kinetic, motion.load[0], bent_too_far, count)
+        if outcome >= 0:
+            break
+        before, potential = kinetic, _potential(energy, aim, motion, pull)
+        at_rest = potential if before == 0.0 else at_rest
+        kinetic = _accelerate(pull, masses, aim.moment, 0.5 if before == 0.0 else 1.0, motion)
+        gained = potential > at_rest + _GAIN * max(abs(energy), 1.0)
+        if kinetic >= before and not gained:
+            _go(held, 1.0, motion.velocity, motion.rate, motion)
+            continue
+        _go(held, -0.5, motion.last, motion.last_rate, motion)
+        _stop(motion)
+        kinetic = 0.0
+        restarts += 1
+        heaviness *= _HEAVIER if gained else 1.0
+        weigh(rod, held, motion, heaviness, aim.frees_load, masses)
+    moment = pull.load_grad[0]
+    return Ended(
+        outcome, bent_too_far, count, restarts, residual, kinetic, start, energy, moment, kept
+    )
+
+
+def _at_rest(held: Supports, state: State) -> Motion:
+    """A rod that is about to move."""
+    n, b = held.free.shape
+    load = np.array([float(state.load)])
+    return Motion(
+        state.quat.copy(),
+        state.stretch.copy(),
+        load,
+        np.zeros((n, b)),
+        np.zeros(1),
+        np.zeros((n, b)),
+        np.zeros(1),
+    )
+
+
+def relax(
+    body: Rod,
+    held: Supports,
+    start: State,
+    *,
+    kick: Direction | None = None,
+    moment: float | None = None,
+    stops: tuple[float, float] = (-np.inf, np.inf),
+    tolerance: float = 1e-9,
+    most: int = 200_000,
+    every: int = 0,
+) -> Relaxed:
+    """The state in which a rod comes to rest from ``start``.
+
+    Parameters
+    ----------
+    kick : displacement added to the start, such as along a softest mode.
+    moment : dead moment dL/dload under which the load moves; None: the load is given.
+    stops : loads at which a motion under dead moment ends.
+    tolerance : of the residual, GJ/a; the kinetic energy has to be below its square.
+    most : gradients to be evaluated at most.
+    every : keep every k-th configuration in `Relaxed.history`; 0: none. Where that gets long, every
+        2k-th, 4k-th, ..., so that there are never more than 2,048.
+
+    Raises
+    ------
+    ValueError
+        For a rod with an edge that nothing bends, such as a strut: it has no masses to move with.
+
+    Notes
+    -----
+    Failure to come to rest is a value: see `Relaxed.outcome` and `ADVICE`.
+    """
+    if body.n_edges > len(body.cell) + 1:
+        raise ValueError(
+            f"body must have no more than {len(body.cell) + 1} edges on {len(body.cell)} vertices "
+            f"to be relaxed, got {body.n_edges}: a strut falls by implicit steps (gradient_flow)"
+        )
+    if kick is not None:
+        start = moved(held, start, kick)
+    n, b = held.free.shape
+    motion, pull = _at_rest(held, start), no_pull(held)
+    masses = Masses(np.zeros((n, b, b)), np.zeros((n, b, b)), np.zeros(1))
+    slots = min(most // every + 1, _SLOTS) if every > 0 else 0
+    album = Album(np.empty((slots, n, 4)), np.empty((slots, n)), np.empty(slots), np.empty(slots))
+    free = moment is not None
+    aim = Aim(free, 0.0 if moment is None else moment, *stops, tolerance, most, every)
+    end = _relax(body, held, aim, motion, pull, masses, album)
+    nothing = np.zeros(len(held.target))
+    history = tuple(
+        State(album.quat[k].copy(), album.stretch[k].copy(), nothing, float(album.load[k]))
+        for k in range(end.kept)
+    )
+    return Relaxed(
+        State(motion.quat, motion.stretch, pull.force, float(motion.load[0])),
+        Rest(end.outcome),
+        end.where,
+        end.evaluations,
+        end.restarts,
+        end.residual,
+        end.kinetic,
+        end.energy_start,
+        end.energy,
+        end.moment,
+        history,
+        album.energy[: end.kept].copy(),
+    )

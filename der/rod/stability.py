@@ -1,0 +1,233 @@
+"""How many ways down: the index of a state, class by class, and the softest modes.
+
+The matrix is the Hessian of the Lagrangian, constraint forces included, on the position
+conditions; its negative eigenvalues are those of the bordered matrix less one for each condition.
+On a symmetric state the modes of the full ring fall into classes by what the half-turns do to
+them, and each class is a problem on the sector with conditions of its own (`SymmetryClass`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from der.kernels.assembly import assemble, lengthened, position_rows, take_out
+from der.kernels.block_ldl import factor, inertia, solve_band, solve_refined
+from der.kernels.dense import solve_dense
+from der.kernels.quaternions import Array
+from der.rod.rod import Rod, State
+from der.rod.supports import Supports, check_cut
+
+_SAFE = 1e-7  # scaled border pivot above which an index needs no second look: wrong counts were
+# seen up to 6e-10 on random matrices
+_SETTLED = 1e-13  # of an eigenvalue: its change in the last round
+_SHIFT = 1e-8  # of the largest stiffness: the second look
+
+
+class SymmetryClass(NamedTuple):
+    """The modes of one symmetry, as a problem on the sector."""
+
+    free: NDArray[np.bool_]  # (n, b) what may move
+    weight: Array  # (n_c, n) conditions on positions
+    axis: Array  # (n_c, 3)
+
+
+class Stack(NamedTuple):
+    """Several classes, for a kernel that assembles the matrix of a state once for all of them."""
+
+    free: NDArray[np.bool_]  # (k, n, b)
+    weight: Array  # (k, m, n), of the class with most conditions; the rest are padding
+    axis: Array  # (k, m, 3)
+    conditions: NDArray[np.int64]  # (k,) how many each class has
+
+
+def stack(classes: Sequence[SymmetryClass]) -> Stack:
+    """Some classes of one sector, one behind another."""
+    sizes = [len(modes.axis) for modes in classes]
+    n, m = classes[0].free.shape[0], max(sizes)
+    weight, axis = np.zeros((len(sizes), m, n)), np.zeros((len(sizes), m, 3))
+    for k, (modes, size) in enumerate(zip(classes, sizes, strict=True)):
+        weight[k, :size], axis[k, :size] = modes.weight, modes.axis
+    return Stack(np.array([modes.free for modes in classes]), weight, axis, np.array(sizes))
+
+
+@njit(cache=True, inline="always")
+def _class_matrix(rod, held, system, free, weight, axis, quat, stretch, load):
+    """Blocks and border of the Hessian at a state of ``held``, for the modes of one class."""
+    n, b = held.free.shape
+    n_c = axis.shape[0]
+    border = np.zeros((n, b, n_c))
+    strain = lengthened(rod, held, stretch, load)
+    position_rows(rod.length, weight, axis, quat, strain, np.zeros(n_c), border)
+    return take_out(free, system.diag, system.off, border)
+
+
+@njit(cache=True, inline="always")
+def _stiffness(rod, free, factors):
+    """Estimate of the eigenvalue nearest to zero: the Rayleigh quotient of one inverse iteration.
+
+    It is good where that eigenvalue stands apart from the rest, as one close to zero does.
+    """
+    n, b = free.shape
+    M = factors.schur.shape[0]
+    start, x = np.zeros((n, b, 1)), np.zeros((n, b, 1))
+    for j in range(n):  # neither smooth nor of any symmetry
+        for i in range(b):
+            if free[j, i]:
+                start[j, i, 0] = 0.5 + ((j * b + i) * 0.6180339887498949) % 1.0
+                x[j, i, 0] = rod.length[j] * start[j, i, 0]
+    solve_band(factors.inverse, factors.lower, x)
+    A, y = factors.schur.copy(), np.zeros((M, 1))
+    for j in range(n):
+        for i in range(b):
+            for p in range(M):
+                y[p, 0] -= factors.border[j, i, p] * x[j, i, 0]
+    if not solve_dense(A, y):
+        return 0.0
+    top, bottom = 0.0, 0.0
+    for j in range(n):
+        for i in range(b):
+            if free[j, i]:
+                s = x[j, i, 0]
+                for p in range(M):
+                    s -= factors.lifted[j, i, p] * y[p, 0]
+                top += rod.length[j] * s * start[j, i, 0]
+                bottom += rod.length[j] * s * s
+    return top / bottom if bottom > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _counts(rod, held, classes, quat, stretch, force, load, shift, looks):
+    """Index, how safe it is, and (where ``looks``) the stiffness of the softest mode, (k,) each."""
+    k = classes.free.shape[0]
+    n, b = held.free.shape
+    negative, margin = np.empty(k, dtype=np.int64), np.empty(k)
+    stiffness = np.zeros(k)
+    system = assemble(rod, held, quat, stretch, force, load)
+    for c in range(k):
+        m = classes.conditions[c]
+        # copies: what they are slices of need not be contiguous, and one kind is compiled
+        weight, axis = classes.weight[c, :m].copy(), classes.axis[c, :m].copy()
+        free = classes.free[c].copy()
+        diag, off, border = _class_matrix(
+            rod, held, system, free, weight, axis, quat, stretch, load
+        )
+        if shift != 0.0:
+            for j in range(n):
+                for i in range(b):
+                    diag[j, i, i] += shift * rod.length[j]
+        factors = factor(diag, off, border)
+        count, margin[c] = inertia(factors)
+        negative[c] = count - m
+        if looks and count >= 0:
+            stiffness[c] = _stiffness(rod, free, factors)
+    return negative, margin, stiffness
+
+
+def index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int | None:
+    """Number of negative eigenvalues among the modes of a class; None where it is uncertain.
+
+    A state of ``held`` at which the smallest pivot is tiny is factored again with a shift of
+    either sign: equal counts certify the index, unequal ones make it None.
+    """
+    check_cut(body, modes.free)
+    return _certified(body, held, stack([modes]), state, looks=False)[0][0]
+
+
+def indices_and_stiffness(
+    body: Rod, held: Supports, classes: Stack, state: State
+) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
+    """`index` of each class, and about how stiff its softest mode is [GJ/a^2], with its sign.
+
+    The stiffness is that of `softest_modes`, estimated at little cost: good where it is small.
+    """
+    for free in classes.free:
+        check_cut(body, free)
+    return _certified(body, held, classes, state, looks=True)
+
+
+def _certified(
+    body: Rod, held: Supports, classes: Stack, state: State, *, looks: bool
+) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
+    at = (body, held, classes, state.quat, state.stretch, state.force, state.load)
+    negative, margin, stiffness = _counts(*at, 0.0, looks)
+    counts: list[int | None] = negative.tolist()
+    doubtful = ~((negative >= 0) & (margin > _SAFE))
+    if doubtful.any():
+        shift = _SHIFT * float(body.stiffness.max())
+        below, above = (_counts(*at, s, False)[0] for s in (-shift, shift))
+        for c in np.flatnonzero(doubtful):
+            counts[c] = int(below[c]) if below[c] == above[c] >= 0 else None
+    return tuple(counts), tuple(stiffness.tolist())
+
+
+def raw_index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int:
+    """The index by the signs of the pivots alone, as a bisection for its changes needs it."""
+    at = (body, held, stack([modes]), state.quat, state.stretch, state.force, state.load)
+    return int(_counts(*at, 0.0, False)[0][0])
+
+
+def all_modes(held: Supports) -> SymmetryClass:
+    """Every motion that the supports leave free, as one class."""
+    return SymmetryClass(held.free, held.weight, held.axis)
+
+
+@njit(cache=True)
+def _solve_class(rod, held, modes, quat, stretch, force, load, x):
+    """Replace ``x`` (n, b, r) by the displacements under it as forces, on the conditions."""
+    system = assemble(rod, held, quat, stretch, force, load)
+    diag, off, border = _class_matrix(
+        rod, held, system, modes.free, modes.weight, modes.axis, quat, stretch, load
+    )
+    n, b, r = x.shape
+    m = modes.axis.shape[0]
+    none, no_row = np.zeros(m), np.zeros((n, b))
+    factors = factor(diag, off, border)
+    solve_refined(
+        diag, off, factors, m, no_row, none, no_row, none, 1.0, x, np.zeros((m, r)), np.zeros(r)
+    )
+    for j in range(n):
+        for i in range(b):
+            if not modes.free[j, i]:
+                for k in range(r):
+                    x[j, i, k] = 0.0
+
+
+def softest_modes(
+    body: Rod, held: Supports, modes: SymmetryClass, state: State, count: int = 1
+) -> tuple[Array, Array]:
+    """Eigenvalues nearest to zero (count,) and their modes (count, n, b).
+
+    The eigenproblem is H w = mu M w on the position conditions, M = diag(edge length): mu is a
+    stiffness per length, GJ/a^2, that converges with the mesh. Modes have unit M-norm.
+
+    Notes
+    -----
+    Subspace iteration with the inverse (Bathe), two guard vectors, until a round no longer changes
+    the eigenvalues, or 30 rounds: enough where these are separated by a factor of two from the
+    rest. A mode's error is the square root of its eigenvalue's.
+    """
+    check_cut(body, modes.free)
+    n, b = modes.free.shape
+    size = min(count + 2, int(modes.free.sum()) - len(modes.axis))
+    root = np.sqrt(np.repeat(body.length, b))[:, None]
+    start = np.random.default_rng(0).normal(size=(n * b, size)) * modes.free.reshape(-1, 1)
+    z, _ = np.linalg.qr(start)  # modes times sqrt(M), orthonormal
+    compliance = np.zeros(size)
+    for _ in range(30):
+        y = np.ascontiguousarray((root * z).reshape(n, b, size))
+        _solve_class(body, held, modes, state.quat, state.stretch, state.force, state.load, y)
+        y = root * y.reshape(n * b, size)
+        projected = z.T @ y
+        before = compliance[:count]
+        compliance, turn = np.linalg.eigh(0.5 * (projected + projected.T))
+        order = np.argsort(-np.abs(compliance))
+        compliance = compliance[order]
+        z, _ = np.linalg.qr(y @ turn[:, order])
+        if np.all(np.abs(compliance[:count] - before) <= _SETTLED * np.abs(before)):
+            break
+    return 1.0 / compliance[:count], (z / root).T[:count].reshape(count, n, b)

@@ -1,0 +1,209 @@
+"""A path as a film: all that is to be shown, one entry a step, as arrays.
+
+States are those of the path, in its order; those of a snap, between two of them, are put in from
+the falls that its shapes hold. Free of rerun, which only sends what is worked out here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from der.records.configurations import Fall, Shapes
+from der.records.path import Path
+from der.utils import checks
+from der.utils.checks import Array
+
+ENERGIES = ("bending", "twisting")
+A_OVER_T = 200.0  # of a ring whose record does not say
+SEEN = 0.13  # the wider side of the section, over the ring's mean radius, to be seen at all
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The section as it is drawn."""
+
+    h: float  # along d1, a
+    t: float  # along d2, a
+    factor: float  # over the real ones
+
+
+@dataclass(frozen=True, eq=False)
+class Playback:
+    """All that is shown, one entry a step of the film."""
+
+    x: Array  # (n, N, 3) vertices
+    frames: Array  # (n, N, 3, 3) material frames of the edges
+    position: NDArray[np.int64]  # (n,) in the path; -1 in the middle of a fall
+    gamma: Array  # (n,) rad
+    moment: Array  # (n,) GJ/a; nan in the middle of a fall
+    energy: Array  # (n,) GJ/a
+    density: Array  # (2, n, N) each of ENERGIES over length, at the vertices
+    section: Drawn
+    classes: tuple[str, ...]  # (m,) symmetry classes of the softest modes
+    eigenvalues: Array  # (n, m); nan in the middle of a fall
+    u: Array | None  # (n, N, 3) displacements in the softest mode; nan in the middle of a fall
+
+    @property
+    def size(self) -> float:
+        """Mean radius of the ring at its first state."""
+        return _mean_radius(self.x[0])
+
+    @property
+    def top(self) -> float:
+        """The energy density of the brightest colour: the largest of all equilibria."""
+        return float(self.density[:, self.position >= 0].max()) or 1.0
+
+    def step_of(self, position: int) -> int:
+        """The step of the film that shows a state of the path."""
+        return int(np.flatnonzero(self.position == position)[0])
+
+
+def playback(path: Path, *, rest: Array | None = None) -> Playback:
+    """The film of a path: its states, with its falls put in between.
+
+    Parameters
+    ----------
+    path : with shapes.
+    rest : (N, 3) natural strains of the vertices, integrated [rad]; None for a path that begins
+        flat: those of its first state, times the natural curvature.
+
+    Raises
+    ------
+    ValueError
+        If the path has no state or no shapes, or `rest` is needed or of another shape.
+    """
+    if path.shapes is None or not len(path):
+        raise ValueError("path must have shapes to be recorded, got none")
+    shapes, falls, softest = path.shapes, path.shapes.falls, path.shapes.softest
+    n, n_v, _ = shapes.x.shape
+    if rest is not None:
+        rest = checks.checked_array("rest", rest, (n_v, 3))
+    elif path.gamma[0] == 0.0:
+        rest = number(path.ring, "natural_curvature", 1.0) * _strains(shapes.frames[0])
+    else:
+        raise ValueError(f"rest must be given where gamma begins at {path.gamma[0]:g}")
+    order = _order(n, falls)
+    position = np.where(order < n, order, -1)
+    x, frames, gamma, energy = (
+        np.concatenate([states, *(getattr(fall, name) for fall in falls)])[order]
+        for name, states in (
+            ("x", shapes.x),
+            ("frames", shapes.frames),
+            ("gamma", path.gamma),
+            ("energy", path.energy),
+        )
+    )
+    values = np.empty((n, 0)) if softest is None else softest.eigenvalues
+    return Playback(
+        x=x,
+        frames=frames,
+        position=position,
+        gamma=gamma,
+        moment=spread(path.moment, position),
+        energy=energy,
+        density=_densities(path, _cells(shapes), frames, rest),
+        section=_section(path, x[0]),
+        classes=() if softest is None else softest.classes,
+        eigenvalues=spread(values, position),
+        u=None if softest is None else spread(softest.u, position),
+    )
+
+
+def _order(n: int, falls: Sequence[Fall]) -> NDArray[np.int64]:
+    """Places, in the `n` states followed by all falls, of the film's steps."""
+    after = [np.full(len(fall.x), fall.after + 0.5) for fall in falls]
+    return np.argsort(np.concatenate([np.arange(n), *after]), kind="stable")
+
+
+def spread(values: Array, position: NDArray[np.int64]) -> Array:
+    """Values of the states at every step of the film, nan in the middle of a fall."""
+    out = np.asarray(values, dtype=float)[position]
+    out[position < 0] = np.nan
+    return out
+
+
+def edges(x: Array) -> Array:
+    """Edge vectors (..., N, 3) of closed polygons; edge j ends at vertex j."""
+    return x - np.roll(x, 1, axis=-2)
+
+
+def middles(x: Array) -> Array:
+    """Middles (..., N, 3) of the edges."""
+    return 0.5 * (x + np.roll(x, 1, axis=-2))
+
+
+def grips(film: Playback, radius: float, points: int) -> Array:
+    """How far each grip has turned: arcs, and its own middle last, (2, n, points + 1, 3).
+
+    Parameters
+    ----------
+    radius : of the arcs, over the ring's mean radius.
+    points : on each arc, from where the grip began to where it is.
+    """
+    n_v = film.x.shape[1]
+    middle = middles(film.x)
+    found = []
+    for edge, sign in ((0, 1.0), (n_v // 2, -1.0)):
+        centre, d1 = middle[:, edge], film.frames[0, edge, 0]
+        across = np.cross([0.0, 0.0, 1.0], d1)
+        turned = np.linspace(0.0, sign * film.gamma, points, axis=1)[..., None]
+        arc = radius * film.size * (np.cos(turned) * d1 + np.sin(turned) * across)
+        found.append(np.concatenate([centre[:, None] + arc, centre[:, None]], axis=1))
+    return np.array(found)
+
+
+def _strains(frames: Array) -> Array:
+    """Rotation vectors (..., N, 3) [rad] from each frame to the next, seen in the frames."""
+    turn = frames @ np.roll(frames, -1, axis=-3).swapaxes(-1, -2)
+    axis = 0.5 * np.stack(
+        [
+            turn[..., 2, 1] - turn[..., 1, 2],
+            turn[..., 0, 2] - turn[..., 2, 0],
+            turn[..., 1, 0] - turn[..., 0, 1],
+        ],
+        axis=-1,
+    )
+    sine = np.linalg.norm(axis, axis=-1, keepdims=True)
+    cosine = 0.5 * (np.trace(turn, axis1=-2, axis2=-1)[..., None] - 1.0)
+    small = sine < 1e-9
+    return axis * np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
+
+
+def _cells(shapes: Shapes) -> Array:
+    """Arc lengths (N,) between neighbouring frames; the last one mirrors the first."""
+    if shapes.arc_length is not None:
+        s = shapes.arc_length
+        return np.diff(s, append=s[-1] + s[1])
+    return np.linalg.norm(edges(shapes.x[0]), axis=1)
+
+
+def _densities(path: Path, cell: Array, frames: Array, rest: Array) -> Array:
+    """Densities (2, n, N) of bending and twisting, GJ/a^2."""
+    per_length = (_strains(frames) - rest) / cell[:, None]
+    stiffness = np.array([number(path.section, name, 1.0) for name in ("alpha", "beta", "GJ")])
+    parts = 0.5 * stiffness * per_length**2
+    return np.stack([parts[..., 0] + parts[..., 1], parts[..., 2]])
+
+
+def number(entries: Mapping[str, object], name: str, default: float) -> float:
+    """A number of a record's mapping, or what stands for one that is not there."""
+    value = entries.get(name)
+    return float(value) if isinstance(value, int | float) else default
+
+
+def _section(path: Path, flat: Array) -> Drawn:
+    """h and t of the section, and how many times larger they are drawn."""
+    alpha, beta = (number(path.section, name, 1.0) for name in ("alpha", "beta"))
+    t = 1.0 / number(path.numerics, "a_over_t", A_OVER_T)
+    h = t * number(path.section, "h_over_t", math.sqrt(beta / alpha))
+    factor = float(max(1, math.ceil(SEEN * _mean_radius(flat) / max(h, t))))
+    return Drawn(factor * h, factor * t, factor)
+
+
+def _mean_radius(flat: Array) -> float:
+    return float(np.linalg.norm(edges(flat), axis=1).sum()) / (2 * math.pi)

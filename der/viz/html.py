@@ -1,0 +1,316 @@
+"""A path as one page that any browser opens, offline: the ring to be turned about and scrubbed.
+
+plotly draws; the page carries its code, and all states as packed numbers. What moves is moved by
+`html_page.js`, which is put into the page.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import importlib.util
+import json
+import math
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from der.records.path import Path
+from der.utils.checks import Array
+from der.utils.files import FilePath, write_whole
+from der.viz.animation import Playback, grips
+from der.viz.captions import WORDS, about, captions, names
+from der.viz.curve import SNAP, stretches
+from der.viz.ribbon import VIRIDIS, ribbon, triangles
+from der.viz.tween import in_step
+
+SUFFIX = ".html"
+GAMMA = "\N{GREEK SMALL LETTER GAMMA}"
+FRAMES = 160  # steps of the slider, special points besides
+INK, QUIET, PALE = "#222222", "#767676", "#e4e4e4"
+STABLE, UNSTABLE, FALLING = "#0072B2", "#D55E00", "#8a8a8a"  # Okabe and Ito
+STRETCHES: dict[bool | str | None, tuple[str, str, str]] = {
+    True: ("stable", STABLE, "solid"),
+    False: ("unstable", UNSTABLE, "dash"),
+    None: ("equilibria", STABLE, "solid"),
+    SNAP: ("the ring snaps", FALLING, "dot"),
+}
+PAIR = (STABLE, "#CC79A7")  # of two rings, whose curves share panels
+POINTER, ARC = 0.42, 13  # length of a grip's arrow over the mean radius; points on its arc
+REACH = 1.3  # half the length of the twisting axis, over the farthest point along it
+AXES = {"moment": {"xaxis": "x", "yaxis": "y"}, "energy": {"xaxis": "x2", "yaxis": "y2"}}
+EYE = {"x": 1.14, "y": 0.64, "z": 0.48}
+
+
+def save_html(path: Path | Sequence[Path], file: FilePath, *, frames: int = FRAMES) -> None:
+    """Write the page of a path, or of two beside each other, whole or not at all.
+
+    Parameters
+    ----------
+    path : with shapes; of two, both move at equal gamma wherever there are any (`tween.in_step`).
+    file : .html.
+    frames : steps of the slider, special points besides.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another, plotly is missing, the place cannot be written to, a path has no
+        shapes, or there are more than two.
+    """
+    check_html(file)
+    content = page(path, frames=frames).encode()
+    try:
+        write_whole(file, lambda opened: opened.write(content))
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise ValueError(f"html {str(file)!r} cannot be written: {reason}") from problem
+
+
+def check_html(file: FilePath) -> None:
+    """Refuse, before anything is solved, a file that no page can be written to."""
+    if File(file).suffix.lower() != SUFFIX:
+        raise ValueError(f"html must end in {SUFFIX}, got {str(file)!r}")
+    if importlib.util.find_spec("plotly") is None:
+        raise ValueError(
+            f"html {str(file)!r} needs the package plotly, which is not installed: "
+            f"pip install plotly"
+        )
+
+
+def page(path: Path | Sequence[Path], *, frames: int = FRAMES) -> str:
+    """The page of a path, or of two beside each other; arguments as in `save_html`."""
+    from plotly.offline import get_plotlyjs
+
+    paths = [path] if isinstance(path, Path) else list(path)
+    if len(paths) not in (1, 2):
+        raise ValueError(f"path must be one or two, got {len(paths)}")
+    if frames < 2:
+        raise ValueError(f"frames must be at least 2, got {frames!r}")
+    films = in_step(paths, frames)
+    colours = PAIR if len(paths) == 2 else (INK,)
+    rings = [
+        _ring(path, film, name, colour)
+        for path, film, name, colour in zip(paths, films, names(paths), colours, strict=True)
+    ]
+    data = {"figure": _figure(paths, films, colours), "rings": rings}
+    head, body = "ring-origami: " + " and ".join(names(paths)), files("der.viz") / "html_page.html"
+    texts = [about(path, film) for path, film in zip(paths, films, strict=True)]
+    parts = {
+        "TITLE": html.escape(head),
+        "DATA": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
+        "ABOUT": html.escape("\n\n".join(texts)),
+        "PLAYER": (files("der.viz") / "html_page.js").read_text(encoding="utf-8"),
+        "PLOTLY": get_plotlyjs(),
+    }
+    text = body.read_text(encoding="utf-8")
+    for name, part in parts.items():  # plotly's code last: it may hold any text
+        text = text.replace(f"%{name}%", part)
+    return text
+
+
+def packed(values: ArrayLike, kind: str = "f4") -> str:
+    """Numbers as base64 of little-endian float32 (or another kind); NaN stays NaN."""
+    return base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()
+
+
+def _ring(path: Path, film: Playback, name: str, colour: str) -> dict[str, Any]:
+    """All that changes from step to step."""
+    positions, _ = ribbon(film.x, film.frames, film.section)
+    said = captions(path, film)
+    return {
+        "name": name,
+        "colour": colour,
+        "sections": film.x.shape[1],
+        "positions": packed(positions[:, ::2]),  # each corner is there twice, once for either face
+        "grips": packed(np.moveaxis(grips(film, POINTER, ARC), 0, 1)),
+        "arc": ARC + 1,
+        "density": packed(film.density.sum(axis=0)),
+        "gamma": packed(film.gamma / math.pi, "f8"),
+        "moment": packed(film.moment, "f8"),
+        "energy": packed(film.energy, "f8"),
+        "numbers": [one.numbers for one in said],
+        "stability": [one.line for one in said],
+        "stable": [one.stable for one in said],
+        "events": [one.event for one in said],
+        "marks": sorted({film.step_of(point.position) for point in path.points}),
+    }
+
+
+# --- The figure ------------------------------------------------------------------------------
+
+
+def _figure(
+    paths: Sequence[Path], films: Sequence[Playback], colours: Sequence[str]
+) -> dict[str, Any]:
+    """plotly's figure: what moves are meshes and grips, which come first, and dots, last."""
+    two = len(paths) == 2
+    traces = [_mesh(film, k, films) for k, film in enumerate(films)]
+    traces += [_line(k, INK, 5.0, [0.0], "grips") for k in range(len(films))]
+    for k, film in enumerate(films):
+        end = REACH * float(np.abs(film.x[..., 2]).max())
+        traces.append(_line(k, QUIET, 1.5, [-end, end], "twisting axis"))
+    for name in AXES:
+        for path, colour, called in zip(paths, colours, names(paths), strict=True):
+            own = colour if two else None
+            label = called if two else ""
+            drawn = _curve(path, name, own, label, legend=name == "moment")
+            traces += [trace | AXES[name] for trace in drawn]
+    for name in AXES:
+        for colour in colours:
+            marker = {"size": 13, "color": colour, "line": {"color": "white", "width": 2}}
+            dot: dict[str, Any] = {"type": "scatter", "mode": "markers", "marker": marker}
+            dot |= {"x": [0.0], "y": [0.0], "name": f"present {name}", "cliponaxis": False}
+            traces.append(dot | {"showlegend": False, "hoverinfo": "skip"} | AXES[name])
+    return {"data": traces, "layout": _layout(paths, films)}
+
+
+def _mesh(film: Playback, k: int, films: Sequence[Playback]) -> dict[str, Any]:
+    """The ribbon, coloured by its energy; vertices are put in by the page."""
+    i, j, m = triangles(film.x.shape[1]).T
+    shades = [[n / 8, f"rgb{tuple(int(v) for v in c)}"] for n, c in enumerate(VIRIDIS)]
+    bar = {
+        "title": {"text": "energy per length, GJ/a²", "side": "right", "font": {"size": 11}},
+        "thickness": 9,
+        "len": 0.55,
+        "x": 0.0 if len(films) == 1 else 0.487,
+        "xanchor": "left" if len(films) == 1 else "center",
+        "outlinewidth": 0,
+        "tickfont": {"size": 10},
+    }
+    if len(films) == 2:
+        bar["y"] = 0.72
+    return {
+        "type": "mesh3d",
+        "scene": "scene" if k == 0 else "scene2",
+        **{name: v.tolist() for name, v in (("i", i), ("j", j), ("k", m))},
+        "x": [0.0] * (8 * film.x.shape[1]),
+        "y": [0.0] * (8 * film.x.shape[1]),
+        "z": [0.0] * (8 * film.x.shape[1]),
+        "intensity": [0.0] * (8 * film.x.shape[1]),
+        "cmin": 0.0,
+        "cmax": max(float(one.density[:, one.position >= 0].sum(axis=0).max()) for one in films)
+        or 1.0,
+        "colorscale": shades,
+        "showscale": k == 0,
+        "colorbar": bar,
+        "hoverinfo": "skip",
+        "lighting": {"ambient": 0.62, "diffuse": 0.6, "specular": 0.15, "roughness": 0.6},
+        "lightposition": {"x": 3000, "y": -1500, "z": 4000},
+        "name": "ring",
+    }
+
+
+def _line(k: int, colour: str, width: float, z: list[float], name: str) -> dict[str, Any]:
+    """A line along the twisting axis, or one that the page puts somewhere else."""
+    return {
+        "type": "scatter3d",
+        "mode": "lines",
+        "scene": "scene" if k == 0 else "scene2",
+        "x": [0.0] * len(z),
+        "y": [0.0] * len(z),
+        "z": z,
+        "line": {"color": colour, "width": width},
+        "name": name,
+        "showlegend": False,
+        "hoverinfo": "skip",
+    }
+
+
+def _curve(
+    path: Path, name: str, own: str | None, label: str, *, legend: bool
+) -> list[dict[str, Any]]:
+    """The curve in stretches of one stability, and its special points."""
+    heights: Array = getattr(path, name)
+    traces: list[dict[str, Any]] = []
+    said: set[object] = set()
+    for kind, points in stretches(path, heights):
+        words, colour, dash = STRETCHES[kind]
+        text = f"{label}, {words}" if label else words
+        line = {"color": own or colour, "dash": dash, "width": 2.2, "simplify": False}
+        trace: dict[str, Any] = {"type": "scatter", "mode": "lines", "line": line, "name": text}
+        trace |= {"x": points[:, 0].tolist(), "y": points[:, 1].tolist()}
+        trace |= {"legendgroup": text, "showlegend": legend and kind not in said}
+        trace["hovertemplate"] = f"{GAMMA} = %{{x:.4f}} π<br>%{{y:.4f}}<extra></extra>"
+        traces.append(trace)
+        said.add(kind)
+    at = [point.position for point in path.points]
+    if at:
+        marker = {"size": 7, "color": "white", "line": {"color": own or INK, "width": 1.4}}
+        kinds = [WORDS[point.kind] for point in path.points]
+        marks: dict[str, Any] = {"type": "scatter", "mode": "markers", "marker": marker}
+        marks["text"] = kinds
+        marks |= {"x": (path.gamma[at] / math.pi).tolist(), "y": heights[at].tolist()}
+        marks |= {"name": "special points", "showlegend": False}
+        marks["hovertemplate"] = f"%{{text}}<br>{GAMMA} = %{{x:.6f}} π<br>%{{y:.6f}}<extra></extra>"
+        traces.append(marks)
+    return traces
+
+
+def _range(paths: Sequence[Path], name: str) -> list[float]:
+    """Limits that hold the values of all paths, and a little more."""
+    values = np.concatenate([getattr(path, name) for path in paths])
+    low, high = float(values.min()), float(values.max())
+    room = 0.05 * ((high - low) or 1.0)
+    return [low - room, high + room]
+
+
+def _layout(paths: Sequence[Path], films: Sequence[Playback]) -> dict[str, Any]:
+    """Where the views lie, and in which limits: these never change."""
+    two = len(films) == 2
+    turns = [value / math.pi for value in _range(paths, "gamma")]
+    reach = max(float(np.abs(film.x).max()) + 0.6 * film.section.h for film in films)
+    side = {"range": [-reach, reach], "visible": False}
+    scene = {
+        **{f"{name}axis": dict(side) for name in "xyz"},
+        "aspectmode": "cube",
+        "camera": {"eye": EYE, "up": {"x": 0, "y": 0, "z": 1}},
+        "dragmode": "orbit",
+    }
+    axis = {
+        "showgrid": True,
+        "gridcolor": PALE,
+        "zerolinecolor": "#bdbdbd",
+        "linecolor": QUIET,
+        "ticks": "outside",
+        "tickcolor": QUIET,
+        "tickfont": {"size": 11},
+        "title": {"font": {"size": 12}},
+    }
+
+    def labelled(text: str, **more: Any) -> dict[str, Any]:
+        return {**axis, "title": {"text": text, "font": {"size": 12}, "standoff": 6}, **more}
+
+    if two:
+        domains = {"scene": ([0.0, 0.48], [0.42, 1.0]), "scene2": ([0.52, 1.0], [0.42, 1.0])}
+        panels = [([0.05, 0.47], [0.0, 0.36]), ([0.56, 1.0], [0.0, 0.36])]
+    else:
+        domains = {"scene": ([0.0, 0.52], [0.0, 1.0])}
+        panels = [([0.6, 1.0], [0.55, 1.0]), ([0.6, 1.0], [0.0, 0.45])]
+    scenes = {name: scene | {"domain": {"x": x, "y": y}} for name, (x, y) in domains.items()}
+    (mx, my), (ux, uy) = panels
+    turned = f"rotation of a grip, {GAMMA}/π"
+    return {
+        **scenes,
+        "xaxis": labelled(turned, domain=mx, anchor="y", range=turns),
+        "yaxis": labelled("moment M a/GJ", domain=my, anchor="x", range=_range(paths, "moment")),
+        "xaxis2": labelled(turned, domain=ux, anchor="y2", matches="x"),
+        "yaxis2": labelled("energy U a/GJ", domain=uy, anchor="x2", range=_range(paths, "energy")),
+        "margin": {"l": 10, "r": 16, "t": 8, "b": 46},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "font": {"family": "system-ui, sans-serif", "color": INK},
+        "legend": {
+            "orientation": "h",
+            "x": 1.0,
+            "xanchor": "right",
+            "y": -0.09,
+            "yanchor": "top",
+            "font": {"size": 11},
+        },
+        "uirevision": "keep",
+        "hovermode": "closest",
+    }

@@ -1,0 +1,211 @@
+"""What stands beside a ring in a recording: curves over gamma, series over steps, and words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import groupby, pairwise
+
+import numpy as np
+import rerun as rr
+from numpy.typing import ArrayLike
+
+from der.records.path import Path
+from der.utils.checks import Array
+from der.viz.animation import spread
+from der.viz.axes2d import Panel, dotted
+from der.viz.captions import WORDS, in_words
+from der.viz.curve import SNAP, stretches
+from der.viz.rerun.entities import CHALK, GREEN, ORANGE, QUIET, SKY, VERMILION, Colour, Reel
+from der.viz.ribbon import viridis
+
+# label, colour and radius of a stretch of the curves by whether it is stable
+STRETCHES: dict[bool | str | None, tuple[str, Colour, float]] = {
+    True: ("stable", SKY, 0.9),
+    False: ("unstable", VERMILION, 0.5),
+    None: ("unknown", QUIET, 0.8),
+    SNAP: ("snaps", ORANGE, 0.5),
+}
+CLASSES = (GREEN, SKY, ORANGE)  # of the eigenvalues of each symmetry
+MOVING = "in motion"
+# colours of the state lines; any index but 0 is vermilion
+STATES: dict[str, Colour] = {
+    "stable": (0, 114, 178),
+    MOVING: (120, 94, 20),
+    "start": (70, 70, 70),
+    "fold": (204, 121, 167),
+    "limit of M": (0, 114, 178),
+    "branch point": (150, 80, 0),
+    "snap": (120, 94, 20),
+    "self-crossing": GREEN,
+}
+STEPS = rr.components.InterpolationMode.StepAfter  # a count stays until it changes
+
+
+def send_key(reel: Reel) -> None:
+    """The colours of the energy density, as a bar."""
+    share = np.linspace(0.0, 1.0, 65)
+    bars = [[[300 * a, 0], [300 * b, 0]] for a, b in pairwise(share)]
+    shades = viridis(0.5 * (share[1:] + share[:-1]))
+    reel.still("key/bar", rr.LineStrips2D(bars, colors=shades, radii=5.0))
+    ends = ["0", "energy density, GJ/a²", f"{reel.top:.3g}"]
+    send_labels(reel, "key/values", [[0, 14], [150, 14], [300, 14]], ends)
+
+
+def send_labels(
+    reel: Reel,
+    entity: str,
+    places: ArrayLike,
+    labels: Sequence[str],
+    *,
+    colour: Colour = CHALK,
+) -> None:
+    """Words on a 2-D panel."""
+    points = rr.Points2D(places, labels=labels, radii=0.01, colors=colour, show_labels=True)
+    reel.still(entity, points)
+
+
+def send_curve(
+    reel: Reel,
+    path: Path,
+    name: str,
+    *,
+    panel: Panel | None = None,
+    entity: str = "",
+    colour: Colour | None = None,
+) -> None:
+    """One panel: the whole curve over gamma, its special points, and the present state on it.
+
+    Parameters
+    ----------
+    panel : one that is shared, and has axes; a new one, with axes, if not given.
+    entity : where it goes; ``curves/name`` if not given.
+    colour : of the curve and its dot, where several share a panel.
+    """
+    film, entity = reel.film, entity or f"curves/{name}"
+    heights: Array = getattr(path, name)
+    if panel is None:
+        panel = Panel(path.gamma, heights)
+        send_axes(reel, entity, panel)
+    pieces = [
+        (side, piece)
+        for side, line in stretches(path, heights)
+        for piece in panel.inside(panel.place(math.pi * line[:, 0], line[:, 1]))
+    ]
+    for key, (label, own, width) in STRETCHES.items():
+        strips = [piece for side, piece in pieces if side is key]
+        if key is SNAP or (key is False and colour is not None):
+            strips = [dash for strip in strips for dash in dotted(strip)]
+        if strips:
+            lines = rr.LineStrips2D(strips, colors=colour or own, radii=width)
+            reel.still(f"{entity}/{label}", lines)
+    at = [point.position for point in path.points]
+    if at:
+        labels = np.array([WORDS[point.kind] for point in path.points])
+        places = panel.place(path.gamma[at], heights[at])
+        shown = panel.holds(places)
+        marks = rr.Points2D(
+            places[shown],
+            colors=ORANGE,
+            radii=1.3,
+            labels=labels[shown].tolist(),
+            show_labels=False,
+        )
+        reel.still(f"{entity}/points", marks)
+    values: Array = getattr(film, name)
+    places = panel.place(film.gamma, values)
+    known = np.isfinite(values) & panel.holds(places)
+    dots = places[known]
+    shade, size = (colour, 3.2) if colour else ((255, 255, 255), 2.4)
+    reel.still(f"{entity}/now", rr.Points2D.from_fields(colors=shade, radii=size, draw_order=50.0))
+    columns = rr.Points2D.columns(positions=dots.astype(np.float32))
+    reel.run(f"{entity}/now", columns.partition(known.astype(int)))
+
+
+def send_axes(reel: Reel, entity: str, panel: Panel) -> None:
+    """The axes of a panel with their ticks."""
+    foot = panel.values[0]
+    across = panel.place(panel.gamma, foot)
+    upright = panel.place(panel.gamma[0], panel.values)
+    lines = [across, upright]
+    if foot <= 0.0 <= panel.values[1]:
+        lines.append(panel.place(panel.gamma, 0.0))
+    below = panel.place(panel.turns, foot)
+    beside = panel.place(panel.gamma[0], panel.rounds)
+    lines += [*np.stack([below, np.add(below, [0.0, 2.0])], axis=1)]
+    lines += [*np.stack([beside, np.add(beside, [-2.0, 0.0])], axis=1)]
+    reel.still(f"{entity}/axes", rr.LineStrips2D(lines, colors=QUIET, radii=0.2))
+    places = np.concatenate([np.add(below, [0.0, 3.0]), np.add(beside, [-9.0, -4.0])])
+    words = [f"{turn / math.pi:.5g} π" for turn in panel.turns]
+    words += [f"{value:.6g}" for value in panel.rounds]
+    send_labels(reel, f"{entity}/values", places, words)
+
+
+def send_series(reel: Reel, path: Path, *, name: str = "", colour: Colour | None = None) -> None:
+    """M, U, gamma, the index and the lowest eigenvalues over the steps.
+
+    Parameters
+    ----------
+    name, colour : of the ring, where there are several.
+    """
+    film = reel.film
+    index = spread(np.ma.filled(path.index.astype(float), np.nan), film.position)
+    series = {
+        "moment": (film.moment, "M a/GJ", SKY),
+        "gamma": (film.gamma, "gamma, rad", QUIET),
+        "energy": (film.energy, "U a/GJ", ORANGE),
+        "index": (index, "index", VERMILION),
+    }
+    for k, (label, column) in enumerate(zip(film.classes, film.eigenvalues.T, strict=True)):
+        series[f"eigenvalues/{label.replace(' ', '_')}"] = (column, label, CLASSES[k])
+    for entity, (values, label, own) in series.items():
+        known = np.isfinite(values)
+        if known.any():
+            steps = np.flatnonzero(known | (film.position < 0))  # a nan breaks the line
+            shape = STEPS if entity == "index" else rr.components.InterpolationMode.Linear
+            said = f"{label.split(' ')[0].rstrip(',')}, {name}" if name else label
+            style = rr.SeriesLines(
+                colors=colour or own, names=said, widths=2.0, interpolation_mode=shape
+            )
+            reel.still(f"series/{entity}", style)
+            reel.run(f"series/{entity}", rr.Scalars.columns(scalars=values[steps]), steps)
+
+
+# --- Words ----------------------------------------------------------------------------------
+
+
+def send_events(reel: Reel, path: Path, *, name: str = "") -> None:
+    """Special points in the log; stability and the last event as lines over the steps.
+
+    Parameters
+    ----------
+    name : of the ring, where there are several.
+    """
+    film = reel.film
+    steps = [film.step_of(point.position) for point in path.points]
+    before = f"{name}: " if name else ""
+    if steps:
+        reel.run(
+            "events", rr.TextLog.columns(text=[before + in_words(p) for p in path.points]), steps
+        )
+    kinds = [WORDS[point.kind] for point in path.points]
+    index = path.index.tolist()
+    states: dict[int, str] = {}
+    for step, k in enumerate(film.position.tolist()):
+        if k < 0:
+            states[step] = MOVING
+        elif index[k] is not None:
+            states[step] = f"index {index[k]}" if index[k] else "stable"
+    _send_states(reel, "states/stability", states)
+    _send_states(reel, "states/event", {0: "start", **dict(zip(steps, kinds, strict=True))})
+
+
+def _send_states(reel: Reel, entity: str, states: Mapping[int, str]) -> None:
+    """A line of states, each from its step on until another follows."""
+    changes = [next(group) for _, group in groupby(sorted(states), key=lambda k: states[k])]
+    if not changes:
+        return
+    values = sorted(set(states.values()))
+    colours = [STATES.get(value, VERMILION) for value in values]
+    reel.still(entity, rr.StateConfiguration(values=values, colors=colours))
+    reel.run(entity, rr.StateChange.columns(state=[states[k] for k in changes]), changes)

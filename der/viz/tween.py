@@ -1,0 +1,186 @@
+"""Films that run evenly, and two of them in step: steps between the states of paths.
+
+A path has few states, close together where it bends: good for reading, not for watching. Here a
+film is cut anew, in steps of about equal motion. Between two equilibria the ring is drawn on a
+spline through its states (as the curves are, see `curve`), within falls on a straight line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from der.records.path import Path
+from der.utils.checks import Array
+from der.viz.animation import Playback, playback
+from der.viz.curve import chord_length, pieces, smooth
+
+PER = 16  # points of the drawn curve in an interval: the present state moves on these
+FINE = 240  # steps of each of two films before they are brought in step
+_ROUND = 1e-9
+
+
+def evenly(path: Path, n: int) -> Playback:
+    """The film of a path in ``n`` steps of about equal motion; special points are kept besides."""
+    film = playback(path)
+    return between(path, film, _even(path, film, n))
+
+
+def in_step(paths: Sequence[Path], n: int) -> list[Playback]:
+    """Films of one or two paths in about ``n`` common steps, at equal gamma wherever there are any.
+
+    Where one ring turns back in gamma or snaps, the other waits.
+    """
+    if len(paths) == 1:
+        return [evenly(paths[0], n)]
+    films = [playback(path) for path in paths]
+    fine = [_even(path, film, FINE) for path, film in zip(paths, films, strict=True)]
+    gamma = [
+        between(path, film, at).gamma for path, film, at in zip(paths, films, fine, strict=True)
+    ]
+    pairs = together(*gamma)
+    chosen = set(np.linspace(0, len(pairs) - 1, n).round().astype(int).tolist())
+    for k, (path, film) in enumerate(zip(paths, films, strict=True)):
+        for step in _kept(path, film):
+            chosen.add(int(np.searchsorted(fine[k][pairs[:, k]], step - _ROUND)))
+    rows = pairs[sorted(chosen)]
+    return [
+        between(path, film, fine[k][rows[:, k]])
+        for k, (path, film) in enumerate(zip(paths, films, strict=True))
+    ]
+
+
+def together(one: Array, other: Array) -> NDArray[np.int64]:
+    """Pairs (k, 2) of places in two sequences, each running forwards, as near as can be throughout.
+
+    The least sum of differences, by dynamic programming (time warping); of equal ways the one on
+    which both go on.
+    """
+    n, m = len(one), len(other)
+    apart = np.abs(one[:, None] - other) + 1e-9
+    cost = np.full((n + 1, m + 1), np.inf)
+    cost[0, 0] = 0.0
+    for i in range(n):
+        above, row = cost[i], cost[i + 1]
+        ahead = np.minimum(above[:-1], above[1:])
+        for j in range(m):
+            row[j + 1] = apart[i, j] + min(ahead[j], row[j])
+    pairs = [(n, m)]
+    while pairs[-1] != (1, 1):
+        i, j = pairs[-1]
+        pairs.append(min(((i - 1, j - 1), (i - 1, j), (i, j - 1)), key=lambda p: cost[p]))
+    return np.array(pairs[::-1], dtype=np.int64) - 1
+
+
+def between(path: Path, film: Playback, places: Array) -> Playback:
+    """The film at places between its steps, without modes.
+
+    Parameters
+    ----------
+    places : (m,) ascending; 2.5 is in the middle between the steps 2 and 3. Where a snap has no
+        history there is nothing between the two: the ring is shown before or after it.
+    """
+    last = len(film.x) - 1
+    at = np.clip(np.asarray(places, dtype=float), 0.0, last)
+    at = np.where(np.abs(at - at.round()) < _ROUND, at.round(), at)
+    landed = [film.step_of(p.position) for p in path.points if p.kind == "snap" and p.position]
+    for step in landed:
+        if film.position[step - 1] >= 0:  # no history
+            at = np.where((at > step - 1) & (at < step), (at + 0.5).astype(int), at)
+    k = np.minimum(at.astype(int), max(last - 1, 0))
+    falling = (film.position[k] < 0) | (film.position[np.minimum(k + 1, last)] < 0)
+    n, n_v, _ = film.x.shape
+    density = np.moveaxis(film.density, 0, -1)
+    flat = np.concatenate(
+        [film.x, film.frames.reshape(n, n_v, 9), density], axis=2
+    )  # all that is drawn of a vertex
+    drawn = _splined(path, film, flat.reshape(n, -1), at).reshape(len(at), n_v, -1)
+    share = at - k
+    position = film.position[np.where(share == 1.0, np.minimum(k + 1, last), k)]
+    inside = falling & (position < 0) | falling & (share > 0.0) & (share < 1.0)
+    return replace(
+        film,
+        x=drawn[..., :3],
+        gamma=_on_curve(path, film, "gamma", at, inside),
+        moment=_on_curve(path, film, "moment", at, inside),
+        energy=_on_curve(path, film, "energy", at, inside),
+        frames=_orthonormal(drawn[..., 3:12].reshape(len(at), n_v, 3, 3)),
+        position=np.where(inside, -1, position),
+        density=np.moveaxis(np.maximum(drawn[..., 12:], 0.0), -1, 0),
+        classes=(),
+        eigenvalues=np.empty((len(at), 0)),
+        u=None,
+    )
+
+
+def _even(path: Path, film: Playback, n: int) -> Array:
+    """Places in the film at equal motion, half of the ring and half of its grips."""
+    if len(film.x) == 1:
+        return np.zeros(1)
+    moved = np.linalg.norm(np.diff(film.x, axis=0), axis=2).max(axis=1)
+    turned = np.abs(np.diff(film.gamma))
+    shares = [np.append(0.0, np.cumsum(v)) / (float(v.sum()) or 1.0) for v in (moved, turned)]
+    way = shares[0] + shares[1]
+    steps = np.arange(len(film.x))
+    rising = np.append(True, np.diff(way) > 0.0)
+    places = np.interp(np.linspace(0.0, way[-1], n), way[rising], steps[rising])
+    return np.unique(np.concatenate([places, _kept(path, film)]))
+
+
+def _kept(path: Path, film: Playback) -> list[float]:
+    """Steps that are always shown: special points, and the last."""
+    return [*(float(film.step_of(p.position)) for p in path.points), len(film.x) - 1.0]
+
+
+def _on_curve(path: Path, film: Playback, name: str, at: Array, inside: Array) -> Array:
+    """Values at places of the film: on the curve as it is drawn, within falls on their own."""
+    steps = np.arange(len(film.x))
+    known = film.position >= 0
+    # a place in the path: the steps of a fall are none, their place is that of the state they leave
+    place = np.interp(at, steps[known], film.position[known].astype(float))
+    if len(path) == 1:
+        values = np.repeat(getattr(path, name), len(at))
+    else:
+        column, height = (0, path.energy) if name == "gamma" else (1, getattr(path, name))
+        curve = smooth(path, height, PER)[:, column] * (np.pi if name == "gamma" else 1.0)
+        values = np.interp(place * PER, np.arange(len(curve)), curve)
+    own: Array = getattr(film, name)
+    falling = np.interp(at, steps, np.nan_to_num(own))
+    if name == "moment":
+        falling = np.full(len(at), np.nan)
+    return np.where(inside, falling, values)
+
+
+def _splined(path: Path, film: Playback, values: Array, at: Array) -> Array:
+    """Rows of values (n, m) at places: splines along the smooth pieces, straight within falls."""
+    from scipy.interpolate import CubicSpline
+
+    k = np.minimum(at.astype(int), max(len(values) - 2, 0))
+    after = np.minimum(k + 1, len(values) - 1)
+    share = (at - k)[:, None]
+    out = (1.0 - share) * values[k] + share * values[after]
+    if len(path) == 1:
+        return out
+    length = chord_length(path)  # as of the curve: else gamma would not be that of the grips
+    for first, last in pieces(path):
+        a, b = film.step_of(first), film.step_of(last)
+        chord = length[first : last + 1]
+        new = np.append(True, np.diff(chord) > 1e-5)
+        if b - a < 2 or np.count_nonzero(new) < 3:
+            continue
+        spline = CubicSpline(chord[new], values[a : b + 1][new], bc_type="natural")
+        here = (at > a) & (at < b)
+        out[here] = spline(np.interp(at[here], np.arange(a, b + 1), chord))
+    return out
+
+
+def _orthonormal(frames: Array) -> Array:
+    """Frames near to these, d3 kept."""
+    d3 = frames[..., 2, :] / np.linalg.norm(frames[..., 2, :], axis=-1, keepdims=True)
+    d1 = frames[..., 0, :]
+    d1 = d1 - np.sum(d1 * d3, axis=-1, keepdims=True) * d3
+    d1 = d1 / np.linalg.norm(d1, axis=-1, keepdims=True)
+    return np.stack([d1, np.cross(d3, d1), d3], axis=-2)

@@ -1,0 +1,107 @@
+"""Rod against boundary-value problem: the comparison, from Python and on the command line."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import der
+from der.analysis.compare import compare, table
+from der.bvp.solve import solve
+from der.cli.commands import main
+from der.records.path import Path
+
+SECTION = der.rectangular_section(1.6)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A ring with two folds, with error bars."""
+    return der.Scene(
+        der.circle(), SECTION, n_edges=128, error_bars=True, contacts=False, stability=False
+    )
+
+
+@pytest.fixture(scope="module")
+def rod(scene):
+    """The rod's path."""
+    return der.fold(scene)
+
+
+@pytest.fixture(scope="module")
+def comparison(scene, rod):
+    """Both."""
+    return compare(scene, rod)
+
+
+def test_the_rod_agrees_within_its_own_error_bars(comparison):
+    """At 95 % of its states or more, and everything finds its counterpart."""
+    assert comparison.within >= 0.95
+    assert comparison.unmatched == 0
+    assert max(comparison.largest) < 1e-6
+
+
+def test_folds_and_limits_are_compared_one_by_one(comparison):
+    """Two folds and three limits at h/t = 1.6, each within the rod's bar."""
+    assert [pair.kind for pair in comparison.pairs].count("fold") == 2
+    assert [pair.kind for pair in comparison.pairs].count("limit") == 3
+    assert all(pair.difference <= pair.bar for pair in comparison.pairs)
+
+
+def test_a_wrong_rod_is_found_out(scene, rod):
+    """One per mille in M is a distance of that size, and beyond every bar but those at M = 0."""
+    wrong = compare(scene, replace(rod, moment=1.001 * rod.moment))
+    assert 2e-4 < wrong.largest[0] < 1.1e-3
+    assert wrong.within < 0.2
+    assert "beyond" in table(wrong)
+
+
+def test_a_fold_too_many_has_no_counterpart(scene, rod):
+    """A point that only one of the two paths has is counted, not dropped."""
+    assert compare(scene, replace(rod, points=rod.points[1:])).unmatched > 0
+
+
+def test_without_error_bars_there_is_no_verdict(scene):
+    """Distances all the same."""
+    plain = replace(scene, error_bars=False, n_edges=64)
+    found = compare(plain, der.fold(plain))
+    assert math.isnan(found.within)
+    assert 1e-5 < found.largest[0] < 1e-2
+
+
+def test_a_path_that_is_not_a_rods_is_refused(scene):
+    """Comparing the boundary-value problem with itself would say nothing."""
+    with pytest.raises(ValueError, match=r"rod must be a path of a rod .* got 'bvp'"):
+        compare(scene, solve(replace(scene, error_bars=False)))
+
+
+def run(*words):
+    """Exit code of the command."""
+    with pytest.raises(SystemExit) as left:
+        main(list(words))
+    return left.value.code
+
+
+def test_bvp_writes_the_record_of_the_other_solver(tmp_path, capsys):
+    """The same record as from fold, indices unknown; summary on standard output."""
+    file = tmp_path / "path.json"
+    words = ("bvp", "ellipse", "--b-over-a", "0.85", "--axis", "y", "--h-over-t", "4")
+    assert run(*words, "--tolerance", "1e-6", "--json", str(file)) == 0
+    path = Path.load(file)
+    assert (path.solver, path.mode.snapping, len(path.folds)) == ("bvp", "snap-back", 2)
+    assert path.index.mask.all()
+    assert "snap-back" in capsys.readouterr().out
+
+
+def test_compare_writes_table_picture_and_data(tmp_path, capsys):
+    """--out DIR holds both records with their differences, and the picture."""
+    words = ("compare", "rectangle", "--b-over-a", "0.6", "--r-over-a", "0.3", "--h-over-t", "4")
+    assert run(*words, "--no-stability", "--out", str(tmp_path / "new")) == 0
+    entries = json.loads((tmp_path / "new" / "comparison.json").read_text())
+    assert (entries["rod"]["solver"], entries["bvp"]["solver"]) == ("der", "bvp")
+    assert entries["within"] >= 0.9
+    assert np.isfinite([state["moment_distance"] for state in entries["states"]]).all()
+    assert (tmp_path / "new" / "comparison.png").read_bytes().startswith(b"\x89PNG")
+    assert "agree within their error bars" in capsys.readouterr().out

@@ -1,0 +1,529 @@
+"""Adaptive scans that lose nothing: whatever dies, resuming gives what an undisturbed run gives."""
+
+import errno
+import json
+import math
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from der.diagram.boundaries import Boundaries
+from der.diagram.cases import LABELS, Row, solve_case
+from der.diagram.distributed import follow
+from der.diagram.families import family
+from der.diagram.jobs import AHEAD
+from der.diagram.scan import BATCH, Interrupted, corners, scan, solve_all
+from der.diagram.scanned_boundaries import BoundaryPoint, Curve
+from der.diagram.store import Store
+from der.diagram.workers import Cluster, Processes, workers
+from validation.stress.kill_and_resume import (
+    NOTES,
+    Killed,
+    calm,
+    kill,
+    kill_and_resume,
+    note,
+    notes,
+)
+
+HERE = Path(__file__).parent
+SMALL = {"b_over_a": (0.9, 1.0), "h_over_t": (1.4, 2.0)}  # of fig3a: three labels, both axes
+
+
+def small():
+    return replace(family("fig3a", ranges=SMALL, finest=4), coarse=2)
+
+
+def toy(case):
+    """A disc of one label in a plane of another, without any mechanics."""
+    inside = math.hypot(case.b_over_a - 0.7, (case.h_over_t - 2.0) / 7.6) < 0.13
+    label = "stable, snap-through" if inside else "unfoldable"
+    return Row(case, label, inside, inside, moment=0.0, slope=1.0, seconds=random.random())
+
+
+def toy_that_is_told(case):
+    """`toy`, which leaves a line for every case that it was given."""
+    note(case)
+    return toy(case)
+
+
+def toy_that_dies_once(case):
+    """`toy`, but the first worker to come here is killed."""
+    if abs(case.h_over_t - 2.0) < 0.3:
+        try:
+            os.close(os.open(os.environ[NOTES], os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            return toy(case)
+        os.kill(os.getpid(), signal.SIGKILL)
+    return toy(case)
+
+
+def toy_with_poison(case):
+    """`toy`, but one case kills every worker."""
+    if case == POISON:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return toy(case)
+
+
+def slow(case):
+    """Real, and slow enough to be met in the middle."""
+    time.sleep(0.01)
+    return toy_that_is_told(case)
+
+
+def deadly(case):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def along(solve, batch):
+    """In place of following a slice: one point of a curve, and a row."""
+    (task,) = batch
+    case = task.part.family.case("x", (0.6, task.part.plane, 0.6))
+    point = BoundaryPoint(case, math.pi, 0.0, 0.0)
+    return Boundaries([Curve("foldability", "x", (point,))], []), [solve(case)]
+
+
+def along_that_dies_once(solve, batch):
+    """`along`, but the first worker to come to the middle is killed."""
+    if batch[0].part.plane == 0.5:
+        try:
+            os.close(os.open(os.environ[NOTES], os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            return along(solve, batch)
+        os.kill(os.getpid(), signal.SIGKILL)
+    return along(solve, batch)
+
+
+def along_with_poison(solve, batch):
+    """`along`, but the slice in the middle kills every worker."""
+    if batch[0].part.plane == 0.5:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return along(solve, batch)
+
+
+def wedge(case):
+    """Foldable from h/t = 2.2 on."""
+    folds = case.h_over_t > 2.2
+    label = LABELS[3] if folds else LABELS[0]
+    return Row(case, label, folds, folds, "snap-through", moment=0.0, slope=1.0)
+
+
+TOY = replace(family("fig3a", finest=16), coarse=4)
+CUBE = replace(family("fig8a", finest=4), coarse=4)
+POISON = TOY.case("x", (0.5, 0.5))
+
+
+class Here(Executor):
+    """An executor that does its tasks at once, for scans whose workers are of no interest."""
+
+    width = 2
+
+    def __init__(self):
+        self.executor = self
+
+    def submit(self, function, *given):
+        """Do a task."""
+        done = Future()
+        done.set_result(function(*given))
+        return done
+
+    def stop(self):
+        """There is nothing to stop."""
+
+
+class Threads:
+    """Threads, which finish in any order."""
+
+    def __init__(self, number):
+        self.width = number
+        self.executor = ThreadPoolExecutor(number)
+
+
+@pytest.fixture
+def told(tmp_path, monkeypatch):
+    """A file that workers know of."""
+    monkeypatch.setenv(NOTES, str(tmp_path / "told"))
+    return tmp_path / "told"
+
+
+def scanned(of, file, crew, solve=toy):
+    with Store(file) as store:
+        return scan(of, store, crew, solve=solve, progress=False)
+
+
+def timeless(rows):
+    """Rows without what they took."""
+    return [row.to_json() | {"seconds": 0.0} for row in rows]
+
+
+# --- Where a scan looks ----------------------------------------------------------------------
+
+
+def test_scan_finds_what_a_full_grid_finds(tmp_path):
+    """All cells of the finest level that the boundary crosses, with a quarter of the cases."""
+    of = family("fig3a", finest=64)
+    found = scanned(of, tmp_path / "cases.jsonl", Here())
+    labels = {
+        (sheet, (i, j)): toy(of.case(sheet, (i / 64, j / 64))).label
+        for sheet in of.sheets
+        for i in range(65)
+        for j in range(65)
+    }
+    mixed = {
+        cell
+        for node in labels
+        for cell in [(node, 1)]
+        if max(node[1]) < 64 and len({labels[corner] for corner in corners(cell)}) > 1
+    }
+    assert set(found.mixed) == mixed
+    assert len(found.rows) < len(labels) / 4
+
+
+def test_cells_tile_the_diagram(tmp_path):
+    """Every unit of area once; nothing is refined twice."""
+    found = scanned(family("fig3a", finest=64), tmp_path / "cases.jsonl", Here())
+    assert sum(edge**2 for _, edge in found.cells) == 2 * 64**2
+
+
+def test_cube_is_scanned_too(tmp_path):
+    """Three parameters, 8 corners a cell."""
+
+    def ball(case):
+        far = math.dist((case.vertex_angle / 90, case.h_over_t / 3), (0.8, 0.8))
+        return Row(case, "unfoldable" if far < 0.25 else "stable, snap-back")
+
+    found = scanned(family("fig8a", finest=16), tmp_path / "cases.jsonl", Here(), ball)
+    assert sum(edge**3 for _, edge in found.cells) == 16**3
+    assert 9**3 < len(found.rows) < 17**3
+
+
+def test_failed_cases_are_rows_and_refine_nothing(tmp_path):
+    """They say nothing about the mode, and are often the dearest."""
+
+    def fails(case):
+        return (
+            Row(case, "failed", status="failed", message="no") if case.h_over_t > 2 else toy(case)
+        )
+
+    found = scanned(
+        family("fig3a", finest=32, ranges={"b_over_a": (0.95, 1.0)}),
+        tmp_path / "cases.jsonl",
+        Here(),
+        fails,
+    )
+    assert len(found.rows) == 2 * 17**2
+    assert sum(not row.ok for row in found.sorted_rows) > 100
+
+
+def test_rows_do_not_depend_on_order(tmp_path):
+    """1 or 5 threads that finish in any order."""
+    one, five = (scanned(TOY, tmp_path / f"{n}.jsonl", Threads(n)) for n in (1, 5))
+    assert timeless(one.sorted_rows) == timeless(five.sorted_rows)
+    assert one.cells == five.cells
+
+
+def test_finer_scan_goes_on_with_the_cases_of_a_coarser(tmp_path, told):
+    """No case twice."""
+    file = tmp_path / "cases.jsonl"
+    first = scanned(TOY, file, Here(), toy_that_is_told)
+    second = scanned(family("fig3a", finest=64), file, Here(), toy_that_is_told)
+    keys = told.read_text().split()
+    assert max(Counter(keys).values()) == 1
+    assert len(keys) == first.solved + second.solved == len(second.sorted_rows)
+
+
+# --- The store -------------------------------------------------------------------------------
+
+
+def test_torn_last_line_is_cut_off(tmp_path):
+    """What is left of it would else spoil the next line, too."""
+    file = tmp_path / "cases.jsonl"
+    scanned(TOY, file, Here())
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-40])
+    again = scanned(TOY, file, Here())
+    assert again.solved == 1
+    assert [json.loads(line)["key"] for line in file.read_bytes().splitlines()] == [
+        json.loads(line)["key"] for line in whole.splitlines()
+    ]
+
+
+def test_unreadable_line_is_a_case_that_is_solved_again(tmp_path):
+    """A bad block costs its own cases only."""
+    file = tmp_path / "cases.jsonl"
+    scanned(TOY, file, Here())
+    lines = file.read_bytes().splitlines(keepends=True)
+    lines[3], lines[7], lines[9] = b"\x00\xff\n", b"[]\n", b'{"key": "a", "case": 3}\n'
+    file.write_bytes(b"".join(lines))
+    assert scanned(TOY, file, Here()).solved == 3
+
+
+def test_store_is_in_use_by_one_run_at_a_time(tmp_path):
+    """Two would solve everything twice, and cut each other's lines."""
+    file = tmp_path / "cases.jsonl"
+    with Store(file), pytest.raises(ValueError, match="is in use by another run"):
+        Store(file)
+    with Store(file):
+        pass
+
+
+def test_full_disk_loses_only_the_cases_in_flight(tmp_path, monkeypatch):
+    """A disk that takes half a line: the error says what is safe, and the half is cut off."""
+    file = tmp_path / "cases.jsonl"
+    write, room = os.write, [20_000]
+
+    def full(where, content):
+        taken = write(where, bytes(content)[: room[0]])
+        room[0] -= taken
+        if taken == 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return taken
+
+    monkeypatch.setattr("der.diagram.store.os.write", full)
+    with pytest.raises(OSError, match=r"No space left on device; (\d+) cases are safe") as caught:
+        scanned(TOY, file, Here())
+    monkeypatch.undo()
+    assert caught.value.errno == errno.ENOSPC
+    lines = file.read_text().splitlines()
+    assert 0 < len(lines) == len([json.loads(line) for line in lines])
+    assert 20_000 - file.stat().st_size < 400 * BATCH
+    again = scanned(TOY, file, Here())
+    assert again.solved == len(again.sorted_rows) - len(lines)
+
+
+# --- Workers that die ------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    return scanned(TOY, tmp_path_factory.mktemp("undisturbed") / "cases.jsonl", Here())
+
+
+def test_worker_that_is_killed_is_replaced(tmp_path, told, undisturbed):
+    """kill -9 of one of two; the run goes on, and its cases are solved after all."""
+    with workers(2) as crew:
+        found = scanned(TOY, tmp_path / "cases.jsonl", crew, toy_that_dies_once)
+    assert told.exists()
+    assert timeless(found.sorted_rows) == timeless(undisturbed.sorted_rows)
+
+
+def test_case_that_kills_its_workers_is_a_failed_row(tmp_path, undisturbed):
+    """And no other: those that died with it are tried again alone."""
+    assert POISON in {row.case for row in undisturbed.sorted_rows}
+    with workers(2) as crew:
+        found = scanned(TOY, tmp_path / "cases.jsonl", crew, toy_with_poison)
+    bad = [row for row in found.sorted_rows if not row.ok]
+    assert [(row.case, row.message) for row in bad] == [(POISON, "its worker died, 2 times")]
+
+
+@pytest.mark.parametrize(
+    ("work", "kinds"),
+    [
+        (along_that_dies_once, ["foldability"] * 5),
+        (along_with_poison, ["foldability"] * 2 + ["foldability (scan)"] + ["foldability"] * 2),
+    ],
+)
+def test_worker_killed_on_a_boundary_is_replaced(tmp_path, told, monkeypatch, work, kinds):
+    """Every slice of a cube has its curves, in order; one that kills has what the scan sees."""
+    monkeypatch.setattr("der.diagram.distributed._follow", work)
+    with Store(tmp_path / "cases.jsonl") as store, workers(2) as crew:
+        found = scan(CUBE, store, Here(), solve=wedge, progress=False)
+        before = len(store)
+        curves = follow(found, store, crew, wedge).curves
+        assert len(store) - before == kinds.count("foldability")
+    assert [curve.kind for curve in curves] == kinds
+    planes = [CUBE.unit(curve.points[0].case)[1] for curve in curves]
+    assert planes == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+def test_workers_that_cannot_work_end_the_run(tmp_path):
+    """Not a folder full of failed rows."""
+    cases = [TOY.case("x", (i / 16, 0.0)) for i in range(16)]
+    with Store(tmp_path / "cases.jsonl") as store, workers(1) as crew:
+        with pytest.raises(RuntimeError, match="workers die before they have solved anything"):
+            solve_all(cases, store, crew, solve=deadly)
+        assert len(store) == 0
+
+
+# --- Runs that die ---------------------------------------------------------------------------
+
+SCRIPT = """
+import sys
+sys.path[:0] = [{house!r}, {here!r}]
+from test_scan import TOY, slow
+from der.diagram.scan import Interrupted, scan
+from der.diagram.store import Store
+from der.diagram.workers import workers
+
+if __name__ == "__main__":
+    with Store({file!r}) as store, workers(2) as crew:
+        try:
+            scan(TOY, store, crew, solve=slow)
+        except Interrupted as stopped:
+            sys.exit(f"stopped: {{stopped}}")
+"""
+
+
+def run(folder):
+    """A run in a process of its own."""
+    file = folder / "cases.jsonl"
+    script = folder / "run.py"
+    script.write_text(SCRIPT.format(house=str(HERE.parent), here=str(HERE), file=str(file)))
+    return subprocess.Popen(
+        [sys.executable, str(script)], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def wait_for(file, lines, process):
+    """Until a file has so many lines."""
+    while not file.exists() or file.read_bytes().count(b"\n") < lines:
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.01)
+
+
+def test_killed_twice_and_resumed_is_as_if_nothing_had_been(tmp_path, told, undisturbed):
+    """kill -9 of all its processes in mid-run; what was in flight, and only that, is begun again.
+
+    In flight are at most two tasks each of two workers. The command
+    `validation.stress.kill_and_resume` does it twenty times to a real diagram.
+    """
+    file = tmp_path / "cases.jsonl"
+    moments = [lambda process, n=lines: wait_for(file, n, process) for lines in (40, 100)]
+    flight = kill_and_resume(lambda: run(tmp_path), moments, file, told)
+    assert len(flight) == 2
+    assert all(0 <= lost <= 2 * AHEAD * BATCH for lost in flight)
+    with Store(file) as store:
+        found = scan(TOY, store, Here(), solve=toy, progress=False)
+    assert found.solved == 0
+    assert timeless(found.sorted_rows) == timeless(undisturbed.sorted_rows)
+    times = notes(told)
+    assert set(times) == {row.case.key for row in undisturbed.sorted_rows}
+    assert times.total() - len(times) == sum(flight)
+    assert file.read_bytes().count(b"\n") == len(times)
+
+
+def test_workers_leave_when_their_parent_is_killed(tmp_path, told):
+    """They would wait for ever for tasks that nobody sends."""
+    process = run(tmp_path)
+    wait_for(tmp_path / "cases.jsonl", 20, process)
+    assert kill(process, workers_too=False)
+    assert calm(told)
+
+
+def test_killed_run_that_differs_is_not_ok():
+    """A table that is another, a case that was solved though it was safe, or stored twice."""
+    good = Killed(2, 10, 13, (1, 2), 10, {"cases.csv": True})
+    assert good.ok
+    assert good.again == 3
+    assert not replace(good, same={"cases.csv": False}).ok
+    assert not replace(good, begun=14).ok
+    assert not replace(good, stored=11).ok
+    assert "NOT as it should be" in str(replace(good, stored=11))
+
+
+def test_ctrl_c_keeps_what_is_finished(tmp_path, told):
+    """It says how much, and nothing is torn."""
+    process = run(tmp_path)
+    wait_for(tmp_path / "cases.jsonl", 20, process)
+    process.send_signal(signal.SIGINT)
+    process.wait(timeout=20)
+    words = process.stderr.read()
+    process.stderr.close()
+    with Store(tmp_path / "cases.jsonl") as store:
+        assert f"stopped: {len(store)} cases are in" in words
+        assert "Traceback" not in words
+
+
+def test_workers_are_put_away_whatever_is_pressed(monkeypatch):
+    """A second Ctrl-C meanwhile would leave their semaphores behind; afterwards it works again."""
+    with workers(1) as crew:
+        shutdown = crew.executor.shutdown
+
+        def pressed(**options):
+            signal.raise_signal(signal.SIGINT)
+            shutdown(**options)
+
+        monkeypatch.setattr(crew.executor, "shutdown", pressed)
+        crew.stop()
+        monkeypatch.undo()
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_interrupted_is_a_keyboard_interrupt():
+    """So that the command leaves with the exit code of Ctrl-C."""
+    assert issubclass(Interrupted, KeyboardInterrupt)
+
+
+# --- Real cases, real workers ----------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    """A small part of fig3a, by one process."""
+    with workers(1) as crew:
+        return scanned(small(), tmp_path_factory.mktemp("real") / "c.jsonl", crew, solve_case)
+
+
+def test_real_scan_sees_the_three_modes(real):
+    """Around the circle, h/t = 1.4 to 2: unfoldable, then snap-back, then snap-through."""
+    labels = Counter(row.label for row in real.sorted_rows)
+    assert set(labels) == {"unfoldable", "unstable, snap-back", "unstable, snap-through"}
+
+
+def test_rows_do_not_depend_on_the_number_of_workers(tmp_path, real):
+    """To the last bit, but for the time taken."""
+    with workers(2) as crew:
+        two = scanned(small(), tmp_path / "cases.jsonl", crew, solve_case)
+    assert timeless(two.sorted_rows) == timeless(real.sorted_rows)
+
+
+@pytest.mark.filterwarnings("default")  # not ours to mend
+def test_dask_workers_do_the_same_and_may_be_killed(tmp_path, undisturbed, told):
+    """A scheduler with two worker processes, one of them killed in mid-run."""
+    distributed = pytest.importorskip("distributed", reason="needs the extra 'cluster'")
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with (
+        distributed.LocalCluster(**options, silence_logs=50) as cluster,
+        workers(scheduler=cluster.scheduler_address) as crew,
+    ):
+        assert isinstance(crew, Cluster)
+        assert crew.width == 2
+        found = scanned(TOY, tmp_path / "cases.jsonl", crew, toy_that_dies_once)
+    assert told.exists()
+    assert timeless(found.sorted_rows) == timeless(undisturbed.sorted_rows)
+
+
+@pytest.mark.filterwarnings("default")
+def test_scheduler_that_does_not_answer_is_refused(monkeypatch):
+    """By name, with its address."""
+    distributed = pytest.importorskip("distributed", reason="needs the extra 'cluster'")
+    client = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda a, **more: client(a, **more | {"timeout": 1}))
+    with pytest.raises(ValueError, match=r"scheduler must be .*, got 'tcp://127.0.0.1:9'"):
+        Cluster("tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize("number", [0, -1, True, 1.5])
+def test_wrong_number_of_workers_is_refused(number):
+    with (
+        pytest.raises(ValueError, match="workers must be a whole number from 1, got"),
+        workers(number),
+    ):
+        pass
+
+
+def test_processes_are_one_a_core_unless_told():
+    """Of the cores that this process may use."""
+    with workers() as crew:
+        assert isinstance(crew, Processes)
+        assert crew.width == len(os.sched_getaffinity(0))

@@ -1,0 +1,107 @@
+"""What the first command after an installation waits for: compile times by kernel.
+
+A fresh process folds a ring with an empty cache of kernels. Numba tells of every compilation as it
+starts and ends; those inside another one are taken off its time.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import runpy
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from validation.benchmark.rows import Row
+
+COMMAND = ("fold", "circle", "--h-over-t", "4", "--quiet")
+COSTLIEST = 10  # kernels that have a row of their own
+
+
+class Compiled(NamedTuple):
+    """What compiling a kernel has taken, without those that it calls."""
+
+    kernel: str
+    signatures: int
+    seconds: float
+
+
+class Told(NamedTuple):
+    """A compilation starts, or ends."""
+
+    kernel: str
+    time: float  # s
+    starts: bool
+
+
+def rows(command: tuple[str, ...] = COMMAND) -> Iterator[Row]:
+    """The first command, the next one, the kernels compiled and what they leave on disk."""
+    with tempfile.TemporaryDirectory() as folder:
+        cache, out = Path(folder, "cache"), Path(folder, "compiled.json")
+        first = _command(command, cache, out)
+        kernels = [Compiled(*one) for one in json.loads(out.read_text())]
+        again = _command(command, cache, out)
+        kept = [file for file in cache.rglob("*") if file.is_file()]
+        size = 1e-6 * sum(file.stat().st_size for file in kept)
+    yield Row("start-up", "first der fold, compiling, wall", first, "s", 60.0)
+    yield Row("start-up", "the next, loading, wall", again, "s", 3.0)
+    note = f"{sum(k.signatures for k in kernels)} signatures"
+    yield Row("start-up", "kernels compiled", len(kernels), "", None, note)
+    yield Row("start-up", "kernels kept on disk", size, "MB", None, f"{len(kept)} files")
+    for one in kernels[:COSTLIEST]:
+        yield Row("start-up", f"compiling {one.kernel}", one.seconds, "s")
+
+
+def _command(command: tuple[str, ...], cache: Path, out: Path) -> float:
+    """Wall time of the command in a process of its own, which writes ``out`` [s]."""
+    words = [sys.executable, "-m", "validation.benchmark.cold", str(out), *command]
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    start = time.perf_counter()
+    subprocess.run(words, check=True, capture_output=True, env=env)
+    return time.perf_counter() - start
+
+
+def own_times(told: Iterable[Told]) -> list[Compiled]:
+    """Time of each kernel without what it calls, the costliest first."""
+    found: dict[str, Compiled] = {}
+    open_: list[tuple[float, float]] = []  # start, and what was compiled meanwhile
+    for one in told:
+        if one.starts:
+            open_.append((one.time, 0.0))
+            continue
+        start, inside = open_.pop()
+        whole = one.time - start
+        if open_:
+            open_[-1] = open_[-1][0], open_[-1][1] + whole
+        _, signatures, seconds = found.get(one.kernel, Compiled(one.kernel, 0, 0.0))
+        found[one.kernel] = Compiled(one.kernel, signatures + 1, seconds + whole - inside)
+    return sorted(found.values(), key=lambda one: -one.seconds)
+
+
+def _watched(out: Path, command: list[str]) -> None:
+    """Run the command in this process, and write what was compiled for it."""
+    from numba.core import event
+
+    recorder = event.RecordingListener()
+    event.register("numba:compile", recorder)
+    sys.argv = ["der", *command]
+    try:
+        runpy.run_module("der", run_name="__main__")
+    except SystemExit as ended:
+        if ended.code:
+            raise
+    told = []
+    for moment, one in recorder.buffer:
+        kernel = one.data["dispatcher"].py_func
+        name = f"{kernel.__module__}.{kernel.__qualname__}"
+        told.append(Told(name, moment, one.is_start))
+    out.write_text(json.dumps(own_times(told)))
+
+
+if __name__ == "__main__":
+    _watched(Path(sys.argv[1]), sys.argv[2:])

@@ -1,0 +1,112 @@
+"""The rings on which `der bench` compares methods, and what is known of their paths.
+
+The truth is the boundary-value problem's path at a tolerance of 1e-11, at many more states than any
+method visits, and a curve through them (`curves`); where AUTO-07p has computed the same ring, how
+far its states lie from that curve is a row of the bench.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import der
+from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error, read_reference
+from der.bvp.solve import FINEST, solve_visits
+from der.geometry.ring import Ring
+from validation.benchmark.rows import Row
+
+TABLES = Path(__file__).parents[1] / "reference"
+STATES = 400  # over 0 to pi, besides those of the path; 256 are enough for 1e-9
+SHIFTED = 61  # states at other places, by which the curve through the former is judged
+NEAR = 1e-3  # of the scaled state: closer ones would make the curve's parameter uneven
+
+
+class BenchRing(NamedTuple):
+    """A ring, and the table that AUTO-07p has left of it."""
+
+    name: str
+    ring: Ring
+    h_over_t: float = 4.0
+    table: str = ""
+    folds: int = 0
+
+    def scene(self, **wants: object) -> der.Scene:
+        """The ring, and what is wanted of its path."""
+        return der.Scene(self.ring, der.rectangular_section(self.h_over_t), **wants)  # type: ignore[arg-type]
+
+
+RINGS = (
+    BenchRing("circle, h/t 4", der.circle(), table="circ_ht4"),
+    BenchRing("circle, h/t 1.6", der.circle(), 1.6, "circ_ht1.6", 2),
+    BenchRing("ellipse 0.85 about y", der.ellipse(0.85, "y"), table="ell_ba0.85_y_ht4", folds=2),
+    BenchRing("rectangle 0.6, r/a 0.3", der.rectangle(0.6, 0.3), table="rect_ba0.6_ra0.3_x_ht4"),
+    BenchRing("rectangle 0.6, r/a 0.05", der.rectangle(0.6, 0.05)),
+    BenchRing(
+        "triangle 90, r/a 1/30",
+        der.triangle(math.pi / 2, 1 / 30),
+        table="tri_aT90_ra0.0333_ht4",
+        folds=2,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a ring's path."""
+
+    case: BenchRing
+    curve: ReferenceCurve
+    floor: float  # distance, in the scaled planes, below which the curve says nothing
+
+    def errors(self, path: der.Path) -> tuple[float, float]:
+        """Largest normal distances of a path's states in M and U."""
+        return curve_error(path.gamma, path.moment, path.energy, self.curve)
+
+    def fold_error(self, path: der.Path) -> float:
+        """Largest error of a fold's gamma, rad; infinite where one is missing."""
+        return fold_error([point.gamma for point in path.folds], self.curve)
+
+
+def known(case: BenchRing, states: int = STATES) -> Known:
+    """Solve for the path at many states, and judge the curve through them by others."""
+    curve = _curve(case, states, 0.0)
+    other = _curve(case, SHIFTED, 0.37)
+    floor = max(curve_error(other.gamma, other.moment, other.energy, curve))
+    return Known(case, curve, max(floor, FINEST))
+
+
+def _curve(case: BenchRing, states: int, shift: float) -> ReferenceCurve:
+    places = (np.arange(1, states) + shift) * math.pi / states
+    path, visits = solve_visits(case.scene(save_at=tuple(places)), tolerance=FINEST)
+    others = np.array([visit.at.p for visit in visits])
+    scaled = np.column_stack([path.gamma, path.moment, path.energy, others])
+    scaled /= np.abs(scaled).max(axis=0)
+    kept = [0]
+    for k, state in enumerate(scaled):
+        if np.linalg.norm(state - scaled[kept[-1]]) > NEAR:
+            kept.append(k)
+    kept[-1] = len(scaled) - 1  # the end is the end
+    folds = tuple(point.gamma for point in path.folds)
+    return ReferenceCurve(
+        path.gamma[kept], path.moment[kept], path.energy[kept], others[kept], folds
+    )
+
+
+def rows(truth: Known) -> Iterator[Row]:
+    """How well the reference is known, by itself and by AUTO-07p."""
+    name = truth.case.name
+    note = f"{len(truth.curve.gamma)} states at {FINEST:g}; the curve through others, judged by 61"
+    yield Row("reference", name, truth.floor, "", None, note)
+    if truth.case.table:
+        auto = read_reference(TABLES / f"{truth.case.table}.csv")
+        off = max(curve_error(auto.gamma, auto.moment, auto.energy, truth.curve))
+        note = ""
+        if auto.folds:
+            note = f"folds {fold_error(truth.curve.folds, auto):.1e} rad apart"
+        yield Row("reference", f"{name}, states of AUTO-07p off it", off, "", None, note)

@@ -1,0 +1,89 @@
+"""Cost over the number of edges: a Newton iteration, a path, and the memory of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+import der
+from der.kernels.assembly import assemble, take_out
+from der.kernels.block_ldl import factor
+from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
+from der.rod.gripped_ring import Sector, sector
+from der.rod.rod import State
+from validation.benchmark.paths import circle
+from validation.benchmark.rows import Row, cpu_time, measured
+
+SIZES = (16, 64, 256, 1024, 4096, 16384, 65536)
+AS_A_BATCH = 2048  # edges over which short solves are repeated, so that the clock can tell
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What N edges cost."""
+
+    n: int  # edges of the full ring
+    newton: float  # s, CPU: one iteration on the full ring
+    residual: float  # GJ/a, at which Newton's method ends
+    held: int  # B, that one iteration holds at once
+    path: float  # s, CPU: 0 to pi on a quarter
+    path_memory: int  # B, largest that Python and numpy hold meanwhile
+    iterations: int  # of the path
+
+    def __str__(self) -> str:
+        return f"N {self.n}: {1e6 * self.newton / self.n:.2f} us an edge, path {self.path:.3g} s"
+
+    def rows(self) -> Iterator[Row]:
+        """The same as rows."""
+        n = self.n
+        goal = 0.15 if n == 64 else None
+        note = f"{1e6 * self.newton / n:.2f} us an edge, residual {self.residual:.1e}"
+        yield Row("newton", f"full ring, N {n}", 1e3 * self.newton, "ms", goal, note)
+        yield Row("memory", f"iteration, full ring, N {n}", self.held / n, "B/edge", 4096.0)
+        note = f"{self.iterations} Newton iterations"
+        yield Row("path over N", f"quarter, N {n}", 1e3 * self.path, "ms", None, note)
+        kept = 4 * self.path_memory / n
+        note = f"{1e-6 * self.path_memory:.2f} MB; an edge of the quarter"
+        yield Row("memory", f"path, quarter, N {n}", kept, "B/edge", None, note)
+
+
+def scale(n: int, repeats: int) -> Scale:
+    """Measure N edges; paths above 4,096 edges are long enough to be timed once."""
+    newton, residual, ring = _newton(n, repeats)
+    scene = circle(4.0, n_edges=n, stability=False, contacts=False)
+    path = measured(lambda: der.fold(scene), repeats if n <= 4096 else 1, warm=n <= 4096)
+    iterations = path.result.timing.newton_iterations
+    return Scale(n, newton, residual, _bytes(ring), path.cpu, path.memory or 0, iterations)
+
+
+def _newton(n: int, repeats: int) -> tuple[float, float, Sector]:
+    """CPU time of one iteration of the full ring, the residual it ends with, and the ring.
+
+    Timed as whole solves at a given gamma; the last pass of a solve, for tangent and index, costs
+    an iteration, and so does its share of the call.
+    """
+    ring = sector(der.circle(), der.rectangular_section(4.0), n, name="full")
+    flat = equilibrium(ring.body, ring.held, ring.start)
+    rate = flat.tangent
+    start = moved(ring.held, flat.state, Direction(0.1 * rate.q, 0.1 * rate.force, 0.1))
+
+    def solve() -> Equilibrium:
+        return equilibrium(ring.body, ring.held, start, control=Control.LOAD)
+
+    solved = solve()
+    many = max(1, AS_A_BATCH // n)
+    seconds = cpu_time(lambda: [solve() for _ in range(many)], repeats)
+    return seconds / (many * (solved.iterations + 1)), solved.residual, ring
+
+
+def _bytes(ring: Sector) -> int:
+    """Bytes that one iteration holds at once: state, derivatives and factors."""
+    state: State = ring.start
+    held = ring.held
+    system = assemble(ring.body, held, state.quat, state.stretch, state.force, state.load)
+    blocks = take_out(held.free, system.diag, system.off, system.border)
+    factors = factor(*blocks)
+    arrays = [*state, *held, *ring.body, *system, *blocks, *factors]
+    return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))

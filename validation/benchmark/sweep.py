@@ -1,0 +1,201 @@
+"""A thousand rings of the paper's range on a few processes, M to 1e-4, by either solver.
+
+The rod starts every ring on a mesh whose error bars mostly say enough; where they say that M is
+worse than asked for, the ring is folded again on as many edges as their order, 4, promises to do.
+What bars promise is then checked on a sample, against the boundary-value problem. That one's own
+errors are estimates.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+import der
+from der.analysis.compare import compare
+from der.bvp.solve import solve
+from der.diagram.workers import Workers, workers
+from der.geometry.ring import Ring
+from der.geometry.section import Section
+from der.utils.interrupts import NotConverged
+from validation.benchmark.rows import Row
+from validation.stress.random_rings import largest_error, random_rings
+
+ASKED = 1e-4  # of the largest |M|
+SMOOTH, JOINTED = 128, 152  # edges, of rings without and with jumps of curvature
+MOST = 1024
+LEAST, DOUBLED = 1.25, 2.0  # by how much edges grow at a time
+BATCH = 10  # rings handed to a worker at a time
+SEED = 1
+WORKERS = 2
+METHODS = ("rod", "boundary value")
+
+
+@dataclass(frozen=True)
+class Swept:
+    """One ring of a sweep."""
+
+    n: int  # edges that were enough, or the most that were tried; intervals of collocation
+    bar: float | None  # largest error estimated for M, over the largest |M|; None: not known
+    seconds: float  # CPU
+    reason: str  # why there is no path, or no bar; empty: there is
+
+
+def scene(ring: Ring, section: Section, n: int) -> der.Scene:
+    """What a sweep asks of a ring: the curve, with error bars, and nothing besides."""
+    return der.Scene(
+        ring,
+        section,
+        n_edges=n,
+        stability=False,
+        contacts=False,
+        error_bars=True,
+        save_at=(math.pi,),
+    )
+
+
+def swept(ring: Ring, section: Section, asked: float = ASKED) -> Swept:
+    """Fold a ring on as many edges as its error bars ask for."""
+    start = time.process_time()
+    n = _divisible(ring, JOINTED if ring.breaks else SMOOTH)
+    bar, reason = _barred(ring, section, n)
+    while (bar is None or bar > asked) and n < MOST:
+        n = min(_finer(ring, n, bar, asked), MOST)
+        bar, reason = _barred(ring, section, n)
+    return Swept(n, bar, time.process_time() - start, reason)
+
+
+def _finer(ring: Ring, n: int, bar: float | None, asked: float) -> int:
+    """Edges with which a bar that was missed on ``n``, or not known there, is met."""
+    more = DOUBLED if bar is None else min(max((bar / asked) ** 0.25, LEAST), DOUBLED)
+    return _divisible(ring, more * n)
+
+
+def _divisible(ring: Ring, n: float) -> int:
+    """The next number of edges from ``n`` on that can be halved twice, on the ring's sector.
+
+    Where it can be done no third time, cells are shared out on the coarsest of the three meshes,
+    which does justice to the most fillets (`der.geometry.mesh`).
+    """
+    unit = 16 if ring.symmetry == "D2" else 8
+    return unit * (math.ceil(n / unit) // 2 * 2 + 1)
+
+
+def solved(ring: Ring, section: Section, asked: float = ASKED) -> Swept:
+    """Solve a ring's boundary-value problem to the tolerance asked for."""
+    start = time.process_time()
+    try:
+        path = solve(der.Scene(ring, section, save_at=(math.pi,)), tolerance=asked)
+    except NotConverged as failure:
+        return Swept(0, None, time.process_time() - start, str(failure))
+    intervals = int(str(path.numerics["intervals"]))
+    return Swept(intervals, largest_error(path), time.process_time() - start, "")
+
+
+def _barred(ring: Ring, section: Section, n: int) -> tuple[float | None, str]:
+    """The largest bar on ``n`` edges, or None and why."""
+    try:
+        bar = largest_bar(der.fold(scene(ring, section, n)))
+    except NotConverged as failure:
+        return None, str(failure)
+    return bar, "" if bar is not None else "a coarser mesh has no such states"
+
+
+def largest_bar(path: der.Path) -> float | None:
+    """Largest error bar of M, across the curve, over the largest |M|; None where one is missing.
+
+    Notes
+    -----
+    A state's error in gamma shows as one in M where the curve is steep: bars are taken as the
+    normal distance that they allow for, in (gamma/pi, M/max|M|), as all errors of the bench are.
+    """
+    bars: dict[str, Any] = dict(path.error or {})
+    special = {point.position for point in path.points if point.kind in ("branch", "contact")}
+    kept = [k for k in range(len(path)) if k not in special]
+    columns = [[bars[name][k] for k in kept] for name in ("gamma", "moment")]
+    if any(bar is None for column in columns for bar in column):
+        return None
+    gamma, moment = (np.array(column, dtype=float) for column in columns)
+    return float(np.hypot(gamma / np.pi, moment / np.abs(path.moment).max()).max())
+
+
+def rows(
+    count: int = 1000, sample: int = 40, *, number: int = WORKERS, seed: int = SEED
+) -> Iterator[Row]:
+    """What the sweep takes, and what it reaches, by the rod and by the boundary-value problem."""
+    rings = list(islice(random_rings(count, seed), count))
+    start = time.perf_counter()
+    with workers(number) as crew:
+        for method in METHODS:  # loads the kernels, in each process
+            for task in [crew.executor.submit(_batch, rings[:2], method) for _ in range(number)]:
+                task.result()
+        note = "with compiled kernels; not counted below"
+        yield Row("sweep", f"{number} processes", time.perf_counter() - start, "s", None, note)
+        for method in METHODS:
+            start = time.perf_counter()
+            found = _sweep(crew, rings, method)
+            wall = time.perf_counter() - start
+            cpu = sum(one.seconds for one in found)
+            case = f"{method}, {count} rings, {number} processes"
+            note = f"{cpu:.1f} s of CPU time, {cpu / wall:.2f} cores had"
+            yield Row("sweep", f"{case}, wall", wall, "s", 10.0 * count / 1000.0, note)
+            yield from _reached(method, found)
+            if method == "rod":
+                errors = _true(rings, found, sample)
+                yield from _quantiles(f"{method}, error of M in truth, {len(errors)} rings", errors)
+
+
+def _sweep(crew: Workers, rings: list[tuple[Ring, Section]], method: str) -> list[Swept]:
+    """All rings, in their order."""
+    tasks: list[Future[list[Swept]]] = [
+        crew.executor.submit(_batch, rings[k : k + BATCH], method)
+        for k in range(0, len(rings), BATCH)
+    ]
+    return [one for task in tasks for one in task.result()]
+
+
+def _reached(method: str, found: list[Swept]) -> Iterator[Row]:
+    """Time a ring, meshes that were enough, and the errors that are estimated."""
+    each = 1e3 * statistics.median(one.seconds for one in found)
+    unit = "edges" if method == "rod" else "intervals"
+    counts = sorted(Counter(one.n for one in found).items())
+    note = ", ".join(f"{times} on {n} {unit}" for n, times in counts) if method == "rod" else ""
+    yield Row("sweep", f"{method}, median CPU time a ring", each, "ms", None, note)
+    bars = [one.bar for one in found if one.bar is not None]
+    reasons = Counter(one.reason for one in found if one.bar is None)
+    note = "; ".join(f"{times}: {reason}" for reason, times in reasons.items())
+    within = sum(bar <= ASKED for bar in bars)
+    yield Row("sweep", f"{method}, rings with M to {ASKED:g}", within, "", None, note)
+    yield from _quantiles(f"{method}, error of M as estimated", bars)
+
+
+def _batch(rings: list[tuple[Ring, Section]], method: str) -> list[Swept]:
+    work = swept if method == "rod" else solved
+    return [work(ring, section) for ring, section in rings]
+
+
+def _true(rings: list[tuple[Ring, Section]], found: list[Swept], sample: int) -> list[float]:
+    """Largest normal distance in M from the boundary-value problem, of the first of the rings."""
+    errors = []
+    for (ring, section), one in islice(zip(rings, found, strict=True), sample):
+        if one.bar is None:
+            continue
+        asked = scene(ring, section, one.n)
+        errors.append(compare(asked, der.fold(asked)).largest[0])
+    return errors
+
+
+def _quantiles(name: str, values: list[float]) -> Iterator[Row]:
+    """Median, 95 % and largest."""
+    if values:
+        for part, share in (("median", 0.5), ("95 %", 0.95), ("largest", 1.0)):
+            yield Row("sweep", f"{name}, {part}", float(np.quantile(values, share)), "")

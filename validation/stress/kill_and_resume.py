@@ -1,0 +1,295 @@
+"""Phase diagrams killed in mid-run and resumed, against the same one left alone.
+
+    python -m validation.stress.kill_and_resume [--times N] [--diagram NAME] [--finest N]
+        [--workers N] [--seed N]
+
+runs ``der phase`` to its end; then the same in another folder, its processes killed (SIGKILL, the
+whole group) at random times, resumed each time, and at last left to finish. It says whether the
+tables are the same to the last byte, and how many cases were solved more than once: of every case
+that a worker begins a note is taken, so that what was in flight at a kill is known, not estimated.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path as File
+
+from der.diagram.cases import Case, Row, solve_case
+from der.diagram.diagram import STORE, run_phase
+from der.diagram.store import Store
+from validation.arguments import Arguments
+
+NOTES = "RING_ORIGAMI_NOTES"  # environment: the file that workers write to
+TABLES = ("cases.csv", "boundaries.csv", "corners.csv")
+EARLY = 0.2  # of the kills: while the run is starting
+CALM = 0.1  # s without a note, after which nobody works any more
+PATIENCE = 30  # of these
+
+Process = subprocess.Popen[str]
+
+
+@dataclass(frozen=True)
+class Killed:
+    """What kills have cost.
+
+    Attributes
+    ----------
+    kills : how many hit a run; those that it outran are not counted
+    cases : different ones that were begun
+    begun : how often one was begun
+    in_flight : begun by the run that was killed and not yet in the store, at each kill
+    stored : lines of the store
+    same : which tables are the same as those of the run that was left alone, by name
+    """
+
+    kills: int
+    cases: int
+    begun: int
+    in_flight: tuple[int, ...]
+    stored: int
+    same: dict[str, bool]
+
+    @property
+    def again(self) -> int:
+        """Cases begun more than once."""
+        return self.begun - self.cases
+
+    @property
+    def ok(self) -> bool:
+        """Whether all is the same, and nothing was solved again but what was in flight."""
+        once = self.stored == self.cases and self.again <= sum(self.in_flight)
+        return once and all(self.same.values())
+
+    def __str__(self) -> str:
+        flight = f"{min(self.in_flight, default=0)} to {max(self.in_flight, default=0)}"
+        lines = [
+            f"{self.kills} kills; in flight at one: {flight}, {sum(self.in_flight)} in all",
+            f"{self.cases} cases, of which {self.again} were begun more than once; "
+            f"{self.stored} lines in the store",
+        ]
+        lines += [
+            f"{name}: {'the same' if same else 'DIFFERENT'}" for name, same in self.same.items()
+        ]
+        return "\n".join([*lines, "as if nothing had been" if self.ok else "NOT as it should be"])
+
+
+# --- Notes -----------------------------------------------------------------------------------
+
+
+def noted(case: Case) -> Row:
+    """`solve_case`, of which a note is taken as it begins."""
+    note(case)
+    return solve_case(case)
+
+
+def note(case: Case) -> None:
+    """One line in the notes: a write to the end of a file is whole, whoever else writes."""
+    file = os.open(os.environ[NOTES], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    try:
+        os.write(file, f"{case.key}\n".encode())
+    finally:
+        os.close(file)
+
+
+def notes(file: File) -> Counter[str]:
+    """How often each case was begun."""
+    return Counter(file.read_text().split()) if file.exists() else Counter()
+
+
+def calm(file: File) -> bool:
+    """Whether workers that have lost their parent stop taking notes."""
+    for _ in range(PATIENCE):
+        before = file.stat().st_size if file.exists() else 0
+        time.sleep(CALM)
+        if (file.stat().st_size if file.exists() else 0) == before:
+            return True
+    return False
+
+
+# --- Kills -----------------------------------------------------------------------------------
+
+
+def kill(process: Process, *, workers_too: bool = True) -> bool:
+    """Kill a process that leads its group, by SIGKILL; whether it was still there."""
+    there = process.poll() is None
+    if there:
+        if workers_too:
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+    process.wait()
+    if process.stderr is not None:
+        process.stderr.close()
+    return there
+
+
+def lost(store: File, told: File, before: Counter[str]) -> int:
+    """How many cases were begun since ``before``, and are not in the store."""
+    begun = notes(told) - before
+    if not store.exists():
+        return begun.total()
+    with Store(store) as safe:
+        return sum(times for key, times in begun.items() if key not in safe.rows)
+
+
+def kill_and_resume(
+    start: Callable[[], Process],
+    moments: Sequence[Callable[[Process], object]],
+    store: File,
+    told: File,
+) -> tuple[int, ...]:
+    """Start runs and kill each at its moment, then let one finish; what was in flight at kills.
+
+    Parameters
+    ----------
+    start : of a run that resumes, in a session of its own
+    moments : each returns when its run is to be killed, or has ended
+    store, told : the run's store and the notes of its workers
+
+    Raises
+    ------
+    RuntimeError
+        If a run fails.
+    """
+    flight = []
+    for moment in moments:
+        before = notes(told)
+        process = start()
+        moment(process)
+        if kill(process):
+            flight.append(lost(store, told, before))
+    process = start()
+    _, words = process.communicate()
+    if process.returncode:
+        raise RuntimeError(f"a resumed run has failed: {words}")
+    return tuple(flight)
+
+
+# --- The command -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A diagram to be drawn in a process of its own."""
+
+    diagram: str
+    finest: int
+    workers: int
+
+    def start(self, folder: File, told: File) -> Process:
+        """Draw it in a folder, going on with what is there, with notes taken."""
+        code = (
+            f"from validation.stress.kill_and_resume import draw; draw({self!r}, {str(folder)!r})"
+        )
+        return subprocess.Popen(
+            [sys.executable, "-c", f"from validation.stress.kill_and_resume import Wanted; {code}"],
+            env={**os.environ, NOTES: str(told)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def left_alone(self, folder: File) -> None:
+        """Draw it in a folder by the command, from nothing."""
+        options = ["--finest", str(self.finest), "--workers", str(self.workers), "--quiet"]
+        command = [sys.executable, "-m", "der", "phase", self.diagram, "--out", str(folder)]
+        subprocess.run([*command, *options], check=True)
+
+
+def draw(wanted: Wanted, folder: str) -> None:
+    """What a process does that may be killed."""
+    run_phase(
+        wanted.diagram,
+        folder,
+        workers=wanted.workers,
+        finest=wanted.finest,
+        resume=True,
+        quiet=True,
+        solve=noted,
+    )
+
+
+def killed(wanted: Wanted, folder: File, *, times: int, seed: int) -> Killed:
+    """A diagram left alone and one killed so many times, in two folders of ``folder``."""
+    alone, apart, told = folder / "left_alone", folder / "killed", folder / "begun.txt"
+    began = time.monotonic()
+    wanted.left_alone(alone)
+    whole = time.monotonic() - began
+    draws = random.Random(seed)
+    ready = _time_to_start(wanted, folder)
+    share = 2.0 * max(whole - ready, 1.0) / times  # twice the mean: the kills cover the run
+
+    def moment(process: Process) -> None:
+        early = draws.random() < EARLY
+        wait = draws.uniform(0.0, ready) if early else ready + draws.uniform(0.0, share)
+        try:
+            process.wait(wait)
+        except subprocess.TimeoutExpired:
+            return
+
+    flight = kill_and_resume(
+        lambda: wanted.start(apart, told), [moment] * times, apart / STORE, told
+    )
+    begun = notes(told)
+    return Killed(
+        len(flight),
+        len(begun),
+        begun.total(),
+        flight,
+        (apart / STORE).read_bytes().count(b"\n"),
+        {name: _same(alone / name, apart / name) for name in TABLES},
+    )
+
+
+def _time_to_start(wanted: Wanted, folder: File) -> float:
+    """Seconds until a run begins its first case."""
+    told = folder / "first.txt"
+    began = time.monotonic()
+    process = wanted.start(folder / "first", told)
+    while not told.exists() and process.poll() is None:
+        time.sleep(0.01)
+    ready = time.monotonic() - began
+    kill(process)
+    return ready
+
+
+def _same(one: File, other: File) -> bool:
+    return one.exists() and other.exists() and one.read_bytes() == other.read_bytes()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command; 0 if all is as it should be."""
+    words = Arguments(__file__, __doc__)
+    words.add_argument("--times", type=int, default=20, help="kills (20)")
+    words.add_argument("--diagram", default="fig3a", help="see der phase (fig3a)")
+    words.add_argument("--finest", type=int, default=16, help="cells along a side (16)")
+    words.add_argument("--workers", type=int, default=2, help="processes (2)")
+    words.add_argument("--seed", type=int, default=1, help="of the random times (1)")
+    words.add_argument("--out", metavar="DIR", help="keep everything here")
+    given = words.parse_args(arguments)
+    for name in ("times", "workers"):
+        if getattr(given, name) < 1:
+            words.error(f"{name} must be a whole number from 1, got {getattr(given, name)}")
+    wanted = Wanted(given.diagram, given.finest, given.workers)
+    with tempfile.TemporaryDirectory() as beside:
+        folder = File(given.out or beside)
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            words.error(f"out must be an empty folder, got {given.out!r}")
+        found = killed(wanted, folder, times=given.times, seed=given.seed)
+    print(f"{given.diagram}, finest {given.finest}, {given.workers} workers: {found}")
+    return 0 if found.ok else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

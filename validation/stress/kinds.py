@@ -1,0 +1,377 @@
+"""What is done with each kind of case of a stress run, and what must hold of what comes of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import der
+import der.continuation.arclength
+from der.bvp.solve import solve
+from der.geometry.section import Scale
+from der.kernels.assembly import assemble
+from der.kernels.linking import link
+from der.records.configurations import Shapes
+from der.records.path import Path
+from der.rod.gripped_ring import sector
+from der.scene import CONTACTS_UP_TO, Scene
+from der.utils.checks import Array
+from der.utils.interrupts import NotConverged
+from validation.stress.cases import ring_of, scene_of, section_of
+from validation.stress.checks import (
+    Fault,
+    asymmetry,
+    denser,
+    faults,
+    outside_error_bars,
+    too_uncertain,
+    unlike,
+    work_lost,
+)
+from validation.stress.inputs import PERHAPS, arguments, refusal
+from validation.stress.random_rings import LOOSE
+
+SYMMETRIC = 1e-6  # a: a path that was followed on the full ring without leaving the symmetric one
+RETURNED = 1e-6  # a: a ring that has come back
+TIMES = 10.0  # an extrapolated value may be off by so many times its estimated error
+LOOSEST = 1e-9  # tolerance beyond which states of two solves are not compared
+
+
+class Refused(ValueError):
+    """What was asked for is refused by the statement, in a sentence."""
+
+
+# --- One path and all that must hold of it ---------------------------------------------------
+
+
+def _scene(parameters: Mapping[str, Any], **more: Any) -> Scene:
+    """The scene, whose refusal is the statement's affair and not the solver's."""
+    try:
+        return scene_of(parameters, **more)
+    except ValueError as wrong:
+        raise Refused(str(wrong)) from None
+
+
+def _folded(scene: Scene) -> Path:
+    """The path, finished or not."""
+    try:
+        return der.fold(scene)
+    except NotConverged as failure:
+        if failure.path.status != "not converged" or failure.path.message != str(failure):
+            raise AssertionError("the path that is left does not say why it is") from None
+        return failure.path
+
+
+def _unfinished(path: Path) -> Iterator[Fault]:
+    if path.status != "done":
+        yield "NotConverged", path.message
+
+
+def _path(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """A path, and every test that a single one can be put to."""
+    scene = _scene(parameters, shapes=True)
+    path = _folded(scene)
+    yield from _unfinished(path)
+    yield from _judged(scene, path)
+    if scene.unload and path.status == "done" and not any(p.kind == "snap" for p in path.points):
+        yield from _returned(scene, path)
+
+
+def _judged(scene: Scene, path: Path) -> Iterator[Fault]:
+    if not len(path):
+        return
+    yield from faults(scene, path)
+    if path.shapes is not None:
+        yield from balance(scene, path, path.shapes)
+        symmetric = scene.control == "arclength" or scene.sector == "auto"
+        if symmetric and scene.tolerance <= LOOSEST and scene.ring.shape != "profile":
+            off = asymmetry(scene, path.shapes)
+            # at a branch point the ring is free to move along what branches off
+            off[[point.position for point in path.branches]] = 0.0
+            if (worst := float(off.max(initial=0.0))) > SYMMETRIC:
+                yield "asymmetric", f"a state is {worst:.2g} a off its ring's symmetry"
+    if scene.tolerance <= 1e-7:
+        yield from _work(scene, path, der.fold)
+
+
+def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator[Fault]:
+    """Energy is work; where the states are too few to tell, they are asked for again, densely."""
+    lost = work_lost(path)
+    if lost > LOOSE and path.status == "done":
+        wants = {name: getattr(scene, name) for name in _WANTS} | {
+            "save_at": denser(path, scene.gamma_max)
+        }
+        lost = work_lost(solver(Scene(scene.ring, scene.section, **wants)), asked=True)
+    if lost > LOOSE and path.status == "done":
+        yield "energy is not work", f"U and the integral of 4 M dgamma differ by {lost:.2g} of U"
+
+
+_WANTS = (
+    "n_edges",
+    "sector",
+    "stability",
+    "control",
+    "unload",
+    "solver",
+    "gamma_max",
+    "until",
+    "curvature",
+    "stretch",
+    "a_over_t",
+    "tolerance",
+)
+
+
+def _returned(scene: Scene, path: Path, steps: float = RETURNED) -> Iterator[Fault]:
+    """After a loop without a snap the ring is where it was."""
+    if path.shapes is None or scene.tolerance > LOOSEST or path.gamma[-1] != path.gamma[0]:
+        return
+    off = float(np.abs(path.shapes.x[-1] - path.shapes.x[0]).max())
+    limit = 1e-3 if scene.solver == "relaxation" else steps
+    if off > limit:
+        yield "no return", f"the ring comes back {off:.2g} a away from where it was"
+
+
+def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
+    """Every state, whatever sector it was found on, is an equilibrium of the full ring.
+
+    Its frames are taken from the record; the internal forces, which are not in it, are fitted. So
+    residual, energy and moment are computed anew, and Tw + Wr.
+    """
+    piece = sector(
+        scene.ring,
+        scene.section,
+        scene.n_edges,
+        name="full",
+        measure=scene.curvature,
+        stretching=scene.stretching,
+    )
+    raw = path.raw or {}
+    body = piece.body
+    # arc lengths are rounded, and so are cells, which are their differences
+    rounding = 1e-15 * scene.ring.length * float(body.stiffness.max() / body.cell.min() ** 2)
+    columns = [np.asarray(raw.get(name, getattr(path, name))) for name in _COLUMNS]
+    scales = [max(float(np.abs(column).max(initial=0.0)), 1e-3) for column in columns]
+    tolerance = max(scene.tolerance, 1e-8 if scene.solver == "relaxation" else 0.0)
+    if scene.stretching and tolerance > LOOSEST:  # a gap, all in one edge, would be stretch
+        return
+    links = scene.n_edges <= min(256, CONTACTS_UP_TO)
+    worst = dict.fromkeys(("residual", "energy", "moment", "link"), 0.0)
+    for k, (gamma, moment, energy) in enumerate(zip(*columns, strict=True)):
+        quat = _quaternions(shapes.frames[k])
+        edge = shapes.x[k] - np.roll(shapes.x[k], 1, axis=0)
+        length = np.sum(edge * shapes.frames[k, :, 2], axis=1)
+        stretch = length / piece.body.length - 1.0 if scene.stretching else np.zeros(len(quat))
+        residual, noise, found_energy, found_moment = _residual(piece, quat, stretch, float(gamma))
+        allowed = 20.0 * max(tolerance, 10.0 * noise) + 1e-14 * scene.stretching + rounding
+        worst["residual"] = max(worst["residual"], residual / allowed)
+        off = abs(found_energy - energy) / (1e-8 * scales[2] + allowed)
+        worst["energy"] = max(worst["energy"], off)
+        off = abs(found_moment - moment) / (1e-7 * scales[1] + scene.n_edges * allowed)
+        worst["moment"] = max(worst["moment"], off)
+        flat = gamma != 0.0 and float(np.ptp(shapes.x[k, :, 0])) < 1e-3
+        if links and not flat and k % 4 == 0:
+            worst["link"] = max(worst["link"], link(quat, length)[1] / (1e-8 + 100.0 * tolerance))
+    for name, size in worst.items():
+        if not size <= 1.0:
+            yield f"{name} of the full ring", f"{size:.3g} times what rounding allows"
+
+
+_COLUMNS = ("gamma", "moment", "energy")
+
+
+def _quaternions(frames: Array) -> Array:
+    """Quaternions (N, 4), scalar first, of frames (N, 3, 3) whose rows are d1, d2, d3."""
+    found = Rotation.from_matrix(frames.swapaxes(1, 2)).as_quat()
+    return np.ascontiguousarray(np.roll(found, 1, axis=1))
+
+
+def _residual(
+    piece: Any, quat: Array, stretch: Array, gamma: float
+) -> tuple[float, float, float, float]:
+    """Residual, its rounding error, energy and M of a state of the full ring."""
+    held = piece.held
+    force = np.zeros(len(held.target))
+    system = assemble(piece.body, held, quat, stretch, force, gamma)
+    free = held.free.reshape(-1)
+    gradient = system.grad.reshape(-1)[free]
+    border = system.border.reshape(-1, len(force))[free]
+    force = -np.linalg.lstsq(border, gradient, rcond=None)[0]
+    system = assemble(piece.body, held, quat, stretch, force, gamma)
+    residual = max(
+        float(np.abs(system.grad.reshape(-1)[free]).max()), float(np.abs(system.gap).max())
+    )
+    return residual, system.noise, system.energy, piece.moment(system.load_grad)
+
+
+# --- The other kinds -------------------------------------------------------------------------
+
+
+def _bvp(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """A path of the boundary-value problem."""
+    scene = _scene(parameters, shapes=True)
+    tolerance = parameters["bvp"]["tolerance"]
+
+    def solver(scene: Scene) -> Path:
+        return solve(scene, tolerance=tolerance)
+
+    try:
+        path = solver(scene)
+    except NotConverged as failure:
+        path = failure.path
+    yield from _unfinished(path)
+    yield from (fault for fault in faults(scene, path) if tolerance < 1e-5 or fault[0] != "start")
+    yield from too_uncertain(path, tolerance)
+    if tolerance <= 1e-5 and len(path):
+        yield from _work(scene, path, solver)
+
+
+def _compare(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """The rod's error bars hold the values of the boundary-value problem.
+
+    Next to a boundary of folding modes a coarse mesh may lie on its other side, where the path is
+    another: finer ones are tried before the two are said to differ.
+    """
+    scene = _scene(parameters)
+    reference = solve(scene, tolerance=1e-9)
+    found: list[Fault] = []
+    for finer in (1, 2, 4):
+        path = der.fold(replace(scene, n_edges=finer * scene.n_edges))
+        found = list(outside_error_bars(path, reference, TIMES))
+        if len(path.folds) == len(reference.folds):
+            break
+    yield from found
+
+
+def _symmetry(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """A path on the sector is that on the full ring."""
+    found = [_folded(_scene(parameters, sector=name)) for name in ("auto", "full")]
+    for path in found:
+        yield from _unfinished(path)
+    if all(path.status == "done" for path in found):
+        yield from unlike(found[0], found[1], 1e-7)
+
+
+def _steps(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """A path does not depend on the steps in which it is followed."""
+    scene = _scene(parameters)
+    usual = _folded(scene)
+    with _stepping(**parameters["steps"]):
+        other = _folded(scene)
+    yield from _unfinished(other)
+    if usual.status == other.status == "done":
+        yield from unlike(usual, other, 1e-7)
+
+
+@contextmanager
+def _stepping(first: float, longest: float) -> Iterator[None]:
+    """Other lengths of steps along a path than the follower's own."""
+    usual = der.continuation.arclength.FIRST_STEP, der.continuation.arclength.LARGEST_STEP
+    der.continuation.arclength.FIRST_STEP, der.continuation.arclength.LARGEST_STEP = first, longest
+    try:
+        yield
+    finally:
+        der.continuation.arclength.FIRST_STEP, der.continuation.arclength.LARGEST_STEP = usual
+
+
+def _again(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """The same scene gives the same record to the last bit."""
+    first, second = (_without_time(_folded(_scene(parameters))) for _ in range(2))
+    if first != second:
+        yield "not repeatable", "two runs of one scene differ"
+
+
+def _threads(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """Rings folded at once in threads come out as they do one after the other."""
+    scenes = [_scene(one) for one in parameters["rings"]]
+    alone = [_without_time(_folded(scene)) for scene in scenes]
+    with ThreadPoolExecutor(len(scenes)) as pool:
+        together = [_without_time(path) for path in pool.map(_folded, scenes)]
+    if alone != together:
+        yield "threads", "a ring folded beside others differs from the same folded alone"
+
+
+def _without_time(path: Path) -> str:
+    return re.sub(r'"solve_s": [^,}]*', '"solve_s": 0', path.to_json())
+
+
+def _points(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """A ring through noisy points: refused in a sentence, or folded like any other."""
+    try:
+        ring = ring_of(parameters["ring"])
+    except ValueError as wrong:
+        raise Refused(str(wrong)) from None
+    try:
+        scene = Scene(ring, section_of(parameters), shapes=True, **parameters["wants"])
+    except ValueError as wrong:
+        raise Refused(str(wrong)) from None
+    path = _folded(scene)
+    yield from _unfinished(path)
+    yield from _judged(scene, path)
+
+
+def _scale(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """Units grow with the size as GJ/a, of a^3, and with E; h and t may be exchanged."""
+    given = dict(parameters)
+    times = given.pop("times")
+    one = Scale.of(**given)
+    larger = Scale.of(**given | {name: times * given[name] for name in ("h", "t", "a")})
+    stiffer = Scale.of(**given | {"young_modulus": times * given["young_modulus"]})
+    turned = Scale.of(**given | {"h": given["t"], "t": given["h"]})
+    powers = {"moment": 3, "energy": 3, "length": 1, "force": 2}
+    for name, power in powers.items():
+        unit = getattr(one, name)
+        for what, other, factor in (
+            ("size", larger, times**power),
+            ("E", stiffer, 1.0 if name == "length" else times),
+            ("turning h and t", turned, 1.0),
+        ):
+            ratio = getattr(other, name) / unit / factor
+            if not abs(ratio - 1.0) < 1e-12:
+                yield "units", f"the unit of {name} changes with {what} by {ratio} of what it must"
+
+
+def _input(parameters: Mapping[str, Any]) -> Iterator[Fault]:
+    """A value that an argument must not take is refused in a sentence that names the argument."""
+    known = arguments()
+    argument = known[parameters["argument"] % len(known)]
+    names = list(argument.refused if len(argument.refused) < 9 else {**argument.refused, **PERHAPS})
+    if argument.where not in _TAKES_NUMBERS:
+        names = list(argument.refused)
+    if not names:
+        return
+    wrong = refusal(argument, names[parameters["value"] % len(names)])
+    if wrong is not None:
+        yield "input", wrong
+
+
+_TAKES_NUMBERS = ("circle", "section", "rectangular_section", "Scale", "Scale.of", "Section")
+
+_Runner = Callable[[Mapping[str, Any]], Iterator[Fault]]
+RUN: dict[str, _Runner] = {
+    "path": _path,
+    "beyond": _path,
+    "close folds": _path,
+    "natural curvature": _path,
+    "error bars": _path,
+    "angle": _path,
+    "moment": _path,
+    "relaxation": _path,
+    "bvp": _bvp,
+    "compare": _compare,
+    "symmetry": _symmetry,
+    "steps": _steps,
+    "again": _again,
+    "threads": _threads,
+    "points": _points,
+    "extreme": _path,
+    "scale": _scale,
+    "input": _input,
+}

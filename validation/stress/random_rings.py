@@ -1,0 +1,138 @@
+"""Rings at random over the ranges of the paper's phase diagrams, and how the solver fares on them.
+
+A path is suspect if it does not end at pi, if its energy is not the work done, or if an error is
+above the tolerance. A continuation that jumps to another strand gives itself away: the work no
+longer accounts for the energy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from der.bvp.solve import TOLERANCE, solve
+from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
+from der.geometry.section import Section, rectangular_section
+from der.records.path import Path
+from der.scene import Scene
+from der.utils.interrupts import NotConverged
+
+LOOSE = 1e-3  # of U: what the work between states is known to by interpolation
+DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt
+SAME_STATE = 1e-9  # of the length of the path: two states closer than this are one
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A ring whose path is not what it should be."""
+
+    ring: Ring
+    section: Section
+    name: str  # "not converged", "not at pi", "work" or "error"
+    message: str
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What became of the rings."""
+
+    rings: int
+    reached_pi: int
+    suspects: tuple[Suspect, ...]
+    seconds: tuple[float, ...]  # of each solve, as its record says
+
+    def named(self, name: str) -> tuple[Suspect, ...]:
+        """The suspects of one name."""
+        return tuple(suspect for suspect in self.suspects if suspect.name == name)
+
+
+def random_rings(count: int, seed: int) -> Iterator[tuple[Ring, Section]]:
+    """Rings and sections, uniform over the ranges of figures 2, 3, 5 and 8; circles in log h/t.
+
+    nu is uniform from 0 to 0.5, and its ends and 0.3 have their turns too.
+    """
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        shape = random.choice(["circle", "ellipse", "rectangle", "triangle"])
+        axis = str(random.choice(["x", "y"]))
+        nu = float(random.choice([0.0, 0.3, 0.5, random.uniform(0.0, 0.5)]))
+        h_over_t = float(random.uniform(1.0, 4.0))
+        if shape == "circle":
+            ring = circle()
+            h_over_t = float(np.exp(random.uniform(math.log(0.2), math.log(60.0))))
+        elif shape == "ellipse":
+            ring = ellipse(float(random.uniform(0.5, 1.0)), axis)
+            h_over_t = float(random.uniform(0.2, 4.0))
+        elif shape == "rectangle":
+            b = float(random.uniform(0.2, 1.0))
+            ring = rectangle(b, float(random.uniform(0.1, b)), axis)
+        else:
+            apex = math.radians(float(random.uniform(30.0, 120.0)))
+            inscribed = 0.5 * math.tan(math.pi / 4 - apex / 4)
+            ring = triangle(apex, float(random.uniform(0.033, inscribed)))
+        yield ring, rectangular_section(h_over_t, nu)
+
+
+def survey(count: int, seed: int, tolerance: float = TOLERANCE) -> Survey:
+    """Solve random rings and judge their paths."""
+    suspects: list[Suspect] = []
+    seconds = []
+    reached = 0
+    for ring, section in islice(random_rings(count, seed), count):
+        try:
+            path = solve(Scene(ring, section), tolerance=tolerance)
+        except NotConverged as failure:
+            suspects.append(Suspect(ring, section, "not converged", str(failure)))
+            seconds.append(failure.path.timing.solve_s)
+            continue
+        seconds.append(path.timing.solve_s)
+        reached += path.at_pi is not None
+        for name, message in faults(ring, section, path, tolerance):
+            suspects.append(Suspect(ring, section, name, message))
+    return Survey(count, reached, tuple(suspects), tuple(seconds))
+
+
+def faults(ring: Ring, section: Section, path: Path, tolerance: float) -> Iterator[tuple[str, str]]:
+    """Names of what is wrong with a path to pi, each with a sentence."""
+    if path.at_pi is None or path.gamma[-1] != math.pi:
+        yield "not at pi", f"the path ends at gamma = {path.gamma[-1]:.9f}"
+    largest = largest_error(path)
+    if not largest <= tolerance:
+        yield "error", f"an error of {largest:.2g} is estimated"
+    missing = work_missing(path)
+    if missing > LOOSE:  # are there too few states, or is the path broken?
+        dense = tuple(np.linspace(0.0, math.pi, DENSE + 1))
+        missing = work_missing(solve(Scene(ring, section, save_at=dense), tolerance=tolerance))
+        if missing > LOOSE:
+            yield "work", f"U and the integral of 4 M dgamma differ by {missing:.2g} of U"
+
+
+def largest_error(path: Path) -> float:
+    """Largest estimated error of gamma/pi, M and U, relative to the largest on the path."""
+    scales = {
+        "gamma": math.pi,
+        "moment": float(np.abs(path.moment).max()),
+        "energy": float(path.energy.max()),
+    }
+    errors: Mapping[str, Any] = path.error or {}
+    return max(float(np.max(errors[name])) / scale for name, scale in scales.items())
+
+
+def work_missing(path: Path) -> float:
+    """Largest difference of U from the work 4 M dgamma along the path, over the largest U."""
+    scaled = np.column_stack([path.gamma / math.pi, path.moment / np.abs(path.moment).max()])
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1)))
+    new = np.append(True, np.diff(length) > SAME_STATE * length[-1])
+    length, gamma, moment, energy = length[new], path.gamma[new], path.moment[new], path.energy[new]
+    curve = make_interp_spline(length, np.column_stack([gamma, moment]), k=3)
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    half = 0.5 * np.diff(length)[:, None]
+    s = length[:-1, None] + half * (1.0 + nodes)
+    work = 4.0 * (curve(s)[..., 1] * curve(s, 1)[..., 0] * half) @ weights
+    return float(np.abs(np.cumsum(work) - (energy[1:] - energy[0])).max() / energy.max())
