@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from der.bvp.packing import packing_ratio
     from der.bvp.solve import solve as solve_bvp
     from der.diagram.diagram import phase as phase_diagram
+    from der.errors import Interrupted, NotConverged
     from der.geometry.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.geometry.section import Scale, Section, rectangular_section, section
     from der.records.configurations import Shapes
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from der.records.planar import PlanarState, PlanarStates, Squeeze, SqueezePoint
     from der.records.states import RingState, States, Transition
     from der.scene import Scene
-    from der.utils.interrupts import Interrupted, NotConverged
 
 __all__ = [
     "Comparison",
@@ -107,8 +107,8 @@ _HOME = {
     "States": ("der.records.states", "States"),
     "Transition": ("der.records.states", "Transition"),
     "Scene": ("der.scene", "Scene"),
-    "Interrupted": ("der.utils.interrupts", "Interrupted"),
-    "NotConverged": ("der.utils.interrupts", "NotConverged"),
+    "Interrupted": ("der.errors", "Interrupted"),
+    "NotConverged": ("der.errors", "NotConverged"),
 }
 
 

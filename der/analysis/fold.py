@@ -15,6 +15,7 @@ from der.analysis.self_crossing import gap, nearest_strands
 from der.continuation.arclength import follow
 from der.continuation.events import EIGHTH, Visit, Wanted, full_index, three_covered
 from der.continuation.step import Stuck, Tally
+from der.errors import STOPPED, Interrupted, NotConverged
 from der.geometry.mesh import sites
 from der.geometry.ring import circle
 from der.geometry.section import section
@@ -28,7 +29,7 @@ from der.rod.rod import State
 from der.rod.stability import all_modes, index
 from der.scene import Scene, meshes
 from der.utils.checks import counts, shown
-from der.utils.interrupts import STOPPED, Interrupted, NotConverged, interrupts_between_states
+from der.utils.interrupts import interrupts_between_states
 
 _NO_MOMENT = 1e-6  # of the largest |M|: a state of rest
 _KEPT = 64  # configurations of a snap for N gradients; it takes about 5 N

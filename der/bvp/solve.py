@@ -14,6 +14,7 @@ from der.bvp.collocation import Collocation, Solution, collocation
 from der.bvp.continuation import Stuck, Tally, Visit, Wanted, follow
 from der.bvp.full_ring import full_ring, turning
 from der.bvp.sectors import sector
+from der.errors import STOPPED, Interrupted, NotConverged
 from der.geometry.mesh import sites
 from der.geometry.ring import circle
 from der.geometry.section import section
@@ -21,7 +22,7 @@ from der.records.configurations import Shapes
 from der.records.path import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode, release
 from der.scene import Scene
 from der.utils.checks import checked_number, counts
-from der.utils.interrupts import STOPPED, Interrupted, NotConverged, interrupts_between_states
+from der.utils.interrupts import interrupts_between_states
 
 TOLERANCE = 1e-8
 FINEST, COARSEST = 1e-11, 1e-3

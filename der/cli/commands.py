@@ -175,7 +175,7 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
     from der.analysis.compare import compare as compared
     from der.analysis.compare import table
     from der.analysis.fold import fold as solve
-    from der.utils.interrupts import Interrupted, NotConverged
+    from der.errors import Interrupted, NotConverged
 
     try:
         with progress(scene, quiet=files.quiet) as tick:

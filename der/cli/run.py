@@ -31,7 +31,7 @@ def follow(
 
     Where ``other`` is given, what moves shows it, too.
     """
-    from der.utils.interrupts import Interrupted, NotConverged
+    from der.errors import Interrupted, NotConverged
 
     code = 0
     try:

@@ -16,7 +16,7 @@ from der.bvp.sectors import sector
 from der.bvp.solve import solve_visits
 from der.diagram.cases import Row
 from der.diagram.conditions import Value, closeness
-from der.utils.interrupts import NotConverged
+from der.errors import NotConverged
 
 SEED = 1e-9  # tolerance of the path that a condition starts from: it fixes the mesh carried along
 MOST = 3  # places on a path where another one may be near

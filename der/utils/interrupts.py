@@ -1,4 +1,4 @@
-"""What a path that could not be finished leaves behind; the same for both solvers."""
+"""Ctrl-C while compiled kernels run: put off, taken down between states, or ignored."""
 
 from __future__ import annotations
 
@@ -9,40 +9,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # which takes long to load
-    from der.records.path import Path
-
-
-STOPPED = "stopped by the user"
-
-
-class NotConverged(RuntimeError):
-    """A path that could not be followed to its end.
-
-    Attributes
-    ----------
-    path : what was found, up to and with the last good state.
-    """
-
-    def __init__(self, message: str, path: Path) -> None:
-        super().__init__(message)
-        self.path = path
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C in the middle of a path.
-
-    Attributes
-    ----------
-    path : what was found, up to and with the last good state.
-    """
-
-    def __init__(self, path: Path) -> None:
-        super().__init__("interrupted")
-        self.path = path
-
 
 # Functions in which an exception is lost or ends the process: numba's wrappers call the first while
 # they hand a kernel's results over, and do not look whether it succeeded; that is where a signal

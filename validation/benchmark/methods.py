@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import der
 from der.bvp.solve import solve
-from der.utils.interrupts import NotConverged
+from der.errors import NotConverged
 from validation.benchmark.rings import BenchRing, Known
 from validation.benchmark.rows import Trial, failed, finite, measured
 from validation.benchmark.stepping import stepped

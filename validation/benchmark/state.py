@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import der
 from der.bvp.solve import FINEST, solve
-from der.utils.interrupts import NotConverged
+from der.errors import NotConverged
 from validation.benchmark import elastica as bench_elastica
 from validation.benchmark.methods import BARE, RELAXED, STEPPING
 from validation.benchmark.rings import RINGS, BenchRing

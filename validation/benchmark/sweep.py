@@ -24,9 +24,9 @@ import der
 from der.analysis.compare import compare
 from der.bvp.solve import solve
 from der.diagram.workers import Workers, workers
+from der.errors import NotConverged
 from der.geometry.ring import Ring
 from der.geometry.section import Section
-from der.utils.interrupts import NotConverged
 from validation.benchmark.rows import Row
 from validation.stress.random_rings import largest_error, random_rings
 

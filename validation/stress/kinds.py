@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import der
 import der.continuation.arclength
 from der.bvp.solve import solve
+from der.errors import NotConverged
 from der.geometry.section import Scale
 from der.kernels.assembly import assemble
 from der.kernels.linking import link
@@ -23,7 +24,6 @@ from der.records.path import Path
 from der.rod.gripped_ring import sector
 from der.scene import CONTACTS_UP_TO, Scene
 from der.utils.checks import Array
-from der.utils.interrupts import NotConverged
 from validation.stress.cases import ring_of, scene_of, section_of
 from validation.stress.checks import (
     Fault,

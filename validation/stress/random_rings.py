@@ -17,11 +17,11 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from der.bvp.solve import TOLERANCE, solve
+from der.errors import NotConverged
 from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
 from der.geometry.section import Section, rectangular_section
 from der.records.path import Path
 from der.scene import Scene
-from der.utils.interrupts import NotConverged
 
 LOOSE = 1e-3  # of U: what the work between states is known to by interpolation
 DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt

@@ -33,6 +33,7 @@ from der.bvp.solve import solve
 from der.diagram.jobs import Jobs
 from der.diagram.workers import processes
 from der.diagram.workers import workers as started
+from der.errors import NotConverged
 from der.geometry.ring import circle
 from der.geometry.section import section
 from der.rod import equilibrium as newton
@@ -40,7 +41,7 @@ from der.rod import relaxation
 from der.scene import Scene
 from der.utils import checks
 from der.utils.files import FilePath
-from der.utils.interrupts import NotConverged, put_off
+from der.utils.interrupts import put_off
 from validation.stress.cases import Case, case_from_json, cases
 from validation.stress.checks import Fault
 from validation.stress.kinds import RUN, Refused

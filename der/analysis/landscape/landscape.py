@@ -20,6 +20,7 @@ from der.continuation.arclength import follow
 from der.continuation.events import Visit, Wanted, full_index, three_covered, visit
 from der.continuation.richardson import Extrapolated, extrapolated
 from der.continuation.step import Stuck, Tally
+from der.errors import STOPPED
 from der.geometry.mesh import sites
 from der.records.configurations import Shapes
 from der.records.landscape import Barriers, Landscape, Rest
@@ -29,7 +30,7 @@ from der.rod.free_ring import left_alone
 from der.rod.gripped_ring import Sector, sector
 from der.rod.rod import edges
 from der.scene import Scene, meshes
-from der.utils.interrupts import STOPPED, interrupts_between_states
+from der.utils.interrupts import interrupts_between_states
 
 FARTHEST = 2.0 * math.pi  # rad; a path that gets there unfolded, or to its negative, does not fold
 _MOST_STEPS = 600  # rings that fold do so in less than 150

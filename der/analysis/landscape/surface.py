@@ -25,6 +25,7 @@ from der.analysis.snap import Landing
 from der.continuation.arclength import follow
 from der.continuation.events import Visit, Wanted
 from der.continuation.step import Stuck, Tally
+from der.errors import STOPPED
 from der.kernels.quaternions import Array
 from der.records.energy_surface import Surface
 from der.rod.equilibrium import Equilibrium
@@ -33,7 +34,7 @@ from der.rod.rod import State
 from der.rod.stability import index
 from der.rod.supports import Supports
 from der.scene import Scene
-from der.utils.interrupts import STOPPED, interrupts_between_states
+from der.utils.interrupts import interrupts_between_states
 
 STRETCHED = 0.97  # of half the ring's length: beyond, closing conditions lose their rank
 _CEILING = 1.5  # of the path's largest energy: other minima that lie higher are of no interest

@@ -24,6 +24,7 @@ from der.analysis.multistability.descriptors import described, names
 from der.analysis.multistability.initial_guesses import free_starts, gripped_starts
 from der.analysis.multistability.symmetry_images import Images, images
 from der.analysis.multistability.transitions import Fallen, falls
+from der.errors import STOPPED
 from der.kernels.linking import vertices
 from der.kernels.quaternions import rotation
 from der.records.configurations import Shapes
@@ -34,7 +35,7 @@ from der.rod.gripped_ring import Sector, free_ring
 from der.rod.stability import all_modes, softest_modes
 from der.scene import Scene
 from der.utils.checks import checked_number, shown
-from der.utils.interrupts import STOPPED, interrupts_between_states
+from der.utils.interrupts import interrupts_between_states
 
 MOST = 200  # states that may be asked for
 WAYS = 8  # down, at most: states with more are counted and left out

@@ -21,13 +21,14 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from der.continuation.richardson import romberg
+from der.errors import STOPPED
 from der.kernels.planar import Array, negative_planar
 from der.records.planar import FOLDED, PlanarState, PlanarStates
 from der.rod.planar_march import Lost, Solved, march, solved
 from der.rod.planar_ring import PlanarRing, covered, eight, planar_ring, shapes, shifted
 from der.scene import Scene, meshes, sector_name
 from der.utils.checks import shown
-from der.utils.interrupts import STOPPED, interrupts_between_states
+from der.utils.interrupts import interrupts_between_states
 
 MOST = 12  # turns
 _TURNS = 3

@@ -20,13 +20,14 @@ import numpy as np
 
 from der.analysis.planar.planar_states import check_planar, coarser, planar_numerics
 from der.continuation.richardson import romberg
+from der.errors import STOPPED
 from der.kernels.planar import Array, PlanarRod
 from der.records.planar import Squeeze, SqueezePoint
 from der.rod.planar_march import Lost, Solved, Stop, kinds, march, solved
 from der.rod.planar_ring import PlanarRing, covered, planar_ring, shapes
 from der.scene import Scene
 from der.utils.checks import checked_number
-from der.utils.interrupts import STOPPED, interrupts_between_states
+from der.utils.interrupts import interrupts_between_states
 
 _THERE = 1e-9  # of the distance: the flat ring is where it should go
 _SAME = 0.3  # rad: a state on another mesh that is further away is another state
