@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from der.continuation.step import Step, root
+from der.continuation.roots import find_root
+from der.continuation.step import Step
 
 _TURN = 3.0  # rad; an arc has to turn by pi to meet itself (Fenchel)
 _PLACE = 1e-3  # of s: how well the root is found before the curve is corrected there
@@ -129,7 +130,7 @@ def passage(step: Step, low: float, high: float) -> float | None:
             known[s] = float(gap(step.piece.vertices(step.expected(s)), i, k))
         return known[s]
 
-    s = root(apart, low, high, _PLACE)
+    s = find_root(apart, low, high, _PLACE)
     here, (t, first) = apart(s), [one for one in known.items() if one[0] != s][-1]
     if here == first:
         return None

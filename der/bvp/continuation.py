@@ -18,7 +18,7 @@ import numpy as np
 
 from der.bvp.collocation import Collocation, Direction, Error, Failure, Solution
 from der.bvp.meshes import Mesh, fitted
-from der.bvp.roots import rate_of_cubic, root, slowest, turn_of
+from der.continuation.roots import find_root, least_rate, rate_of_cubic, root_of_rate
 
 FIRST_STEP = 0.05
 FIRST_TURN, LEAST_TURN = 0.02, 2e-4  # rad
@@ -170,7 +170,7 @@ class Step:
     def at_gamma(self, gamma: float, low: float, high: float) -> tuple[float, Solution]:
         """The solution at ``gamma`` between s = low and high, where gamma is monotonic."""
         if (self.gamma(low) - gamma) * (self.gamma(high) - gamma) < 0.0:
-            guess = self.guess(root(lambda s: self.gamma(s) - gamma, low, high))
+            guess = self.guess(find_root(lambda s: self.gamma(s) - gamma, low, high))
             try:
                 found = self._solved(guess._replace(gamma=gamma), by_gamma=True)
             except Stuck:
@@ -179,7 +179,7 @@ class Step:
                 s = along(self.start, found)
                 return s, self.found.setdefault(s, found)
         # close to a fold: gamma is a bad coordinate there, s is not
-        s = root(lambda t: self.at(t).gamma - gamma, low, high)
+        s = find_root(lambda t: self.at(t).gamma - gamma, low, high)
         return s, self.at(s)._replace(gamma=gamma)
 
     def _near(self, found: Solution, there: Direction) -> bool:
@@ -439,9 +439,10 @@ def _turns(
     first, last = first / step.cosine(a.at), last / step.cosine(b.at)
     cubic = rate_of_cubic(high - low, length * first, length * last)
     if first * last < 0.0:
-        guess = a.s + length * turn_of(*cubic)
-        yield root(lambda s: value(step.at(s))[1], a.s, b.s, guess)
-    elif length > NARROW * step.length and (place := slowest(*cubic)) is not None:
+        turn = root_of_rate(*cubic)
+        guess = None if turn is None else a.s + length * turn
+        yield find_root(lambda s: value(step.at(s))[1], a.s, b.s, guess=guess)
+    elif length > NARROW * step.length and (place := least_rate(*cubic)) is not None:
         expected = place[1] / length
         off = ASLANT * abs(first) if off is None else off
         if math.copysign(1.0, first) * expected < off:

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from der.continuation.step import ROOT, Step
+from der.continuation.roots import ROOT
+from der.continuation.step import Step
 from der.rod.equilibrium import Direction, Equilibrium, moved
 from der.rod.rod import State
 from der.rod.stability import raw_index

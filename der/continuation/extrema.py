@@ -8,7 +8,8 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from der.continuation.bifurcations import SAME
-from der.continuation.step import ROOT, Step
+from der.continuation.roots import ROOT
+from der.continuation.step import Step
 from der.rod.equilibrium import Equilibrium
 
 _AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way

@@ -9,12 +9,12 @@ the next state in the step starts from the polynomial through all of them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from der.continuation.interpolant import Curve, between, end_rates, onward
+from der.continuation.roots import brent, find_root, smooth_root
 from der.rod.equilibrium import (
     ADVICE,
     Control,
@@ -28,12 +28,9 @@ from der.rod.equilibrium import (
 from der.rod.gripped_ring import Sector
 from der.rod.rod import State
 
-ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
 _ASTRAY = 0.2  # of a step: states that lie farther from its curve are on another branch
 _NEAR = 0.1  # of a step: the same for states at a given load
 _ELSEWHERE = 1e-6  # of s: no rounding leads so far, but a mode without stiffness does
-_LAST = 1e-9  # of s: a correction this small leaves the next one, its square, below `ROOT`
-_GAIN = 0.5  # of a value: a round that leaves more of it is one that Brent's method does better
 
 
 class Stuck(RuntimeError):
@@ -173,7 +170,7 @@ class Step:
             return self.start.state.load + self._curve.load(s) - load
 
         if expected(low) * expected(high) < 0.0:
-            s = root(expected, low, high)
+            s = find_root(expected, low, high)
             step = self._curve.at(s)._replace(load=load - self.start.state.load)
             # the load given, not the one that differences give, to the last bit
             guess = moved(self.piece.held, self.start.state, step).but(load=load)
@@ -249,74 +246,3 @@ class Step:
         )
         self.tally.newton_iterations += found.iterations
         return found
-
-
-def root(f: Callable[[float], float], low: float, high: float, within: float = ROOT) -> float:
-    """Root of ``f`` between two places where its signs differ, to ``within``."""
-    s = smooth_root(f, low, high, within)
-    return brent(f, low, high, within) if s is None else s
-
-
-def brent(f: Callable[[float], float], low: float, high: float, within: float = ROOT) -> float:
-    """`root` by Brent's method."""
-    from scipy.optimize import brentq
-
-    return float(brentq(f, low, high, xtol=within, rtol=8.9e-16))
-
-
-def smooth_root(
-    f: Callable[[float], float],
-    low: float,
-    high: float,
-    within: float = ROOT,
-    *,
-    guess: float | None = None,
-) -> float | None:
-    """`root` by inverse interpolation through four places; None where ``f`` is not that smooth.
-
-    It takes half as many places as Brent's method; the root is the last of them.
-
-    Parameters
-    ----------
-    guess : the first place to look at.
-    """
-    known = [(f(low), low), (f(high), high)]
-    for value, s in known:
-        if value == 0.0:
-            return s
-    sides = {value > 0.0: s for value, s in known}  # the root lies between these two
-    following, last, least = guess, math.inf, math.inf
-    while True:
-        s = _interpolated(known[-4:]) if following is None else following
-        if not min(sides.values()) < s < max(sides.values()):
-            return None
-        value = f(s)
-        if value == 0.0 or (abs(s - last) < max(within, _LAST) and abs(value) <= least):
-            return s  # a value that grows there is one beyond a jump
-        if abs(value) <= ROOT * min(_steepness(*known[:2]), _steepness(known[-1], (value, s))):
-            return s  # no nearer: rounding may make the next value grow
-        sides[value > 0.0] = s
-        if not abs(value) <= _GAIN * least:
-            return None
-        known.append((value, s))
-        following, last, least = None, s, abs(value)
-
-
-def _steepness(a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Of the chord through two values and their places; by two of them jumps are told apart."""
-    return abs((b[0] - a[0]) / (b[1] - a[1]))
-
-
-def _interpolated(known: list[tuple[float, float]]) -> float:
-    """Where the polynomial s(value) through some values and places is at 0; NaN if there is none.
-
-    Neville's scheme.
-    """
-    column = [s for _, s in known]
-    for k in range(1, len(known)):
-        for j in range(len(known) - k):
-            low, high = known[j][0], known[j + k][0]
-            if low == high:
-                return math.nan
-            column[j] = (high * column[j] - low * column[j + 1]) / (high - low)
-    return column[0]

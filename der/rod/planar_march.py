@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from der.continuation.roots import find_root
 from der.kernels.planar import (
     BENT,
     CONVERGED,
@@ -269,18 +270,8 @@ def _between(
 
 def _root(f: Callable[[float], float], low: float, high: float) -> float:
     """Share of the chord at which ``f`` is zero; its values at the ends are known."""
-    from scipy.optimize import brentq
-
     ends = {0.0: low, 1.0: high}
-    found, _ = brentq(
-        lambda s: ends[s] if s in ends else f(s),
-        0.0,
-        1.0,
-        xtol=_ROOT,
-        full_output=True,
-        disp=False,  # a state that is not found is left out
-    )
-    return float(found)
+    return find_root(lambda s: ends[s] if s in ends else f(s), 0.0, 1.0, _ROOT)
 
 
 def _change(at: Callable[[float], Solved], before: int) -> float:

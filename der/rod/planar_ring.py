@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from der.continuation.roots import find_root
 from der.geometry.mesh import sites
 from der.geometry.ring import Ring
 from der.kernels.planar import Array, PlanarRod
@@ -137,10 +138,9 @@ def eight(mesh: PlanarRing, shift: float) -> Array:
     sin(theta/2) = k sn(u), one period of 4 K(k) to the length, 2 E(k) = K(k) (Love 1927, 263);
     at u = 0 the strands cross, at u = K they are bent most.
     """
-    from scipy.optimize import brentq
     from scipy.special import ellipe, ellipj, ellipk
 
-    m = float(brentq(lambda m: 2.0 * ellipe(m) - ellipk(m), 0.5, 0.95, xtol=1e-15))
+    m = find_root(lambda m: 2.0 * ellipe(m) - ellipk(m), 0.5, 0.95)
     places = np.append(shift, shift + mesh.share)
     theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * places, m)[0])
     return np.asarray(theta[1:] - theta[0])

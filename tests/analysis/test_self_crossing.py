@@ -10,7 +10,7 @@ import der
 import der.continuation.events
 from der.analysis.self_crossing import gap, nearest_strands
 from der.continuation.arclength import Tally, Visit, Wanted, follow
-from der.continuation.step import Step, root, smooth_root
+from der.continuation.step import Step
 from der.kernels.quaternions import rotation_vector
 from der.rod.equilibrium import Control, Direction, equilibrium, moved
 from der.rod.gripped_ring import Sector, sector
@@ -143,52 +143,6 @@ def test_a_state_is_solved_for_once():
     first, spent = fresh.at(0.1), fresh.tally.newton_iterations
     assert fresh.at(0.1) is first
     assert fresh.tally.newton_iterations == spent > 0
-
-
-@pytest.mark.parametrize("guess", [None, 0.5, 0.7, 3.0])
-def test_root_of_a_smooth_function(guess):
-    """cos x = x at 0.739085133215..., from wherever in between it begins, in few places."""
-    asked = []
-
-    def f(x):
-        asked.append(x)
-        return math.cos(x) - x
-
-    found = smooth_root(f, 0.0, 1.0, guess=guess)
-    assert len(asked) <= 10
-    assert found == (None if guess == 3.0 else pytest.approx(0.7390851332151607, abs=1e-12))
-
-
-def test_root_of_a_function_with_rounding_is_found_as_soon_as_it_is_one():
-    """Errors of 1e-13 in the values cost no place more, whatever they are: they do not look rough.
-
-    Sixteen roundings of e^x = 2; the root is good to their size.
-    """
-    for seed in range(16):
-        asked, random = [], np.random.default_rng(seed)
-
-        def f(x, asked=asked, random=random):
-            asked.append(x)
-            return math.expm1(x) - 1.0 + 1e-13 * random.uniform(-1.0, 1.0)
-
-        found = smooth_root(f, 0.0, 1.0)
-        assert found == pytest.approx(math.log(2.0), abs=1e-12)
-        assert len(asked) <= 8
-
-
-@pytest.mark.parametrize(
-    ("f", "at"),
-    [
-        (lambda x: 1.0 if x > 0.3 else -1.0, 0.3),  # a jump
-        (lambda x: (x - 0.3) ** 3, 0.3),  # triple
-        (lambda x: math.copysign(abs(x - 0.3) ** 0.3, x - 0.3), 0.3),  # infinitely steep
-        (lambda x: x - 1.0, 1.0),  # at an end
-        (lambda x: x - 0.3 if x <= 0.3 else 0.5, 0.3),  # a jump beside the root
-    ],
-)
-def test_root_of_functions_that_are_not(f, at):
-    """Brent's method takes over where interpolation does not gain."""
-    assert root(f, 0.0, 1.0) == pytest.approx(at, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ["quarter", "half", "full"])

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from der.continuation.events import Visit, Wanted, visit
-from der.continuation.step import Step, Tally, root
+from der.continuation.roots import find_root
+from der.continuation.step import Step, Tally
 from der.rod.equilibrium import Equilibrium, dot
 from der.rod.gripped_ring import Sector
 
@@ -63,4 +64,4 @@ def without_moment(
     """
     step = Step(piece, a, b, 1.0, wanted.tolerance, tally)
     step = replace(step, length=dot(piece.body, a.tangent, step.jump))
-    return step.at(root(lambda s: step.at(s).moment, 0.0, step.length))
+    return step.at(find_root(lambda s: step.at(s).moment, 0.0, step.length))

@@ -26,7 +26,8 @@ from der.analysis.landscape.landscape import FARTHEST, scene_sector
 from der.analysis.landscape.saddle_search import displaced
 from der.continuation.arclength import follow
 from der.continuation.events import Wanted
-from der.continuation.step import Stuck, Tally, root
+from der.continuation.roots import find_root
+from der.continuation.step import Stuck, Tally
 from der.kernels.quaternions import Array, turned
 from der.rod.free_ring import Alone, balance, left_alone
 from der.rod.gripped_ring import Sector
@@ -100,7 +101,7 @@ def eight(whole: Sector, roll: float = 0.0) -> Alone:
     """
     from scipy.special import ellipe, ellipj, ellipk
 
-    m = root(lambda m: float(2.0 * ellipe(m) - ellipk(m)), 0.5, 0.95)
+    m = find_root(lambda m: float(2.0 * ellipe(m) - ellipk(m)), 0.5, 0.95)
     share = whole.arc_length / whole.body.cell.sum()
     theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * share, m)[0])
     return _bent(whole, theta - 2.0 * math.pi * share, roll)
