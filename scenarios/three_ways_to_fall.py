@@ -32,6 +32,7 @@ from der.analysis.snap import KICK, Landing
 from der.continuation.events import Wanted, visit
 from der.continuation.step import Tally
 from der.kernels.quaternions import rotation_vector
+from der.paper.snapping_rings import SNAPPING
 from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium
 from der.rod.falls import Fallen
 from der.rod.gradient_flow import flow
@@ -39,7 +40,6 @@ from der.rod.gripped_ring import Sector, sector
 from der.rod.motion import move
 from der.rod.relaxation import Relaxed, Rest, relax
 from scenarios.output import folder, usage
-from scenarios.snapping_rings import SNAPPING
 
 if __name__ == "__main__":
     usage(__file__, __doc__)

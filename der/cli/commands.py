@@ -192,9 +192,6 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
     return hand_over(found, written, 0, {"plot": plot}, lambda: table(found), quiet=files.quiet)
 
 
-HYSTERESIS = "hysteresis"  # a figure that the rod draws: loading and unloading of four rings
-
-
 @app.command()
 def figure(
     names: Annotated[
@@ -211,10 +208,8 @@ def figure(
         check_named(out=out)
         from der.paper import DIAGRAMS, FIGURES, Interrupted, draw
 
-        several = {"all": [*FIGURES, HYSTERESIS], "diagrams": list(DIAGRAMS)}
+        several = {"all": list(FIGURES), "diagrams": list(DIAGRAMS)}
         chosen = several.get(" ".join(names), names)
-        turned = HYSTERESIS in chosen
-        chosen = [name for name in chosen if name != HYSTERESIS]
         try:
             drawn = draw(chosen, out, workers=workers, warn=lambda words: say(f"der: {words}"))
         except Interrupted as stopped:
@@ -222,10 +217,6 @@ def figure(
         else:
             code = 3 if drawn.failed else 0
     written = [file for files in drawn.written.values() for file in files]
-    if turned and code != 130:
-        from scenarios.hysteresis import draw as draw_loops
-
-        written += draw_loops(File(out))
     for file in written:
         show(str(file))
     for name, reason in drawn.failed.items():

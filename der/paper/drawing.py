@@ -42,7 +42,7 @@ class Interrupted(KeyboardInterrupt):
         self.drawn = drawn
 
 
-def draw(
+def draw_all(
     figures: Mapping[str, Callable[[FilePath], list[File]]],
     folder: FilePath,
     workers: int | None = None,

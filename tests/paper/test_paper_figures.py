@@ -16,6 +16,7 @@ import der
 from der.paper import FIGURES, draw
 from der.paper.cases import Case, curve_of, smooth
 
+CLONE = Path(__file__).parents[2]
 STATE = ["gamma", "moment", "energy", "error_gamma", "error_moment", "error_energy"]
 RING = ["case", "ring", "twist_axis", "b_over_a", "r_over_a", "vertex_angle", "h_over_t"]
 
@@ -46,8 +47,8 @@ def fig11(tmp_path_factory):
 
 
 def test_register_has_the_figures_of_the_paper_that_are_curves_or_shapes():
-    """Figs. 2, 3b, 4, 6, 7, 9, 10, 11, C1, C2, D1 to D3; phase diagrams are sweeps."""
-    known = "2b 2c 3b 4b 4c 6 7b 7c 9 10b 10c 10d 10e 11 C1 C2 D1 D2 D3"
+    """Figs. 2, 3b, 4, 6, 7, 9, 10, 11, C1, C2, D1 to D3, and loops; diagrams are sweeps."""
+    known = "2b 2c 3b 4b 4c 6 7b 7c 9 10b 10c 10d 10e 11 C1 C2 D1 D2 D3 hysteresis"
     assert " ".join(FIGURES).replace("fig", "") == known
 
 
@@ -63,7 +64,7 @@ def test_names_cost_nothing():
 
 def test_an_unknown_name_is_refused_before_anything_is_drawn(tmp_path):
     with pytest.raises(
-        ValueError, match=r"name must be one of fig2b, .*figD3, .*fig8c, got 'fig99'"
+        ValueError, match=r"name must be one of fig2b, .*figD3, hysteresis, .*fig8c, got 'fig99'"
     ):
         draw(["fig2c", "fig99"], tmp_path / "new")
     assert not (tmp_path / "new").exists()
@@ -170,7 +171,7 @@ def test_ctrl_c_ends_what_is_being_drawn_and_keeps_what_is_finished(tmp_path):
     script.write_text(
         "import time\nfrom pathlib import Path\n"
         "from der.utils.files import write_whole\n"
-        "from der.paper.drawing import Interrupted, draw\n"
+        "from der.paper.drawing import Interrupted, draw_all\n"
         "def quick(folder):\n"
         "    write_whole(Path(folder) / 'quick.png', lambda file: file.write(b'drawn'))\n"
         "    return [Path(folder) / 'quick.png']\n"
@@ -179,7 +180,7 @@ def test_ctrl_c_ends_what_is_being_drawn_and_keeps_what_is_finished(tmp_path):
         "    return []\n"
         "if __name__ == '__main__':\n"
         "    try:\n"
-        f"        draw({{'quick': quick, 'slow': slow}}, {str(tmp_path / 'out')!r}, 1)\n"
+        f"        draw_all({{'quick': quick, 'slow': slow}}, {str(tmp_path / 'out')!r}, 1)\n"
         "    except Interrupted as stopped:\n"
         "        print(sorted(stopped.drawn.written), stopped.drawn.failed)\n"
     )
@@ -188,8 +189,8 @@ def test_ctrl_c_ends_what_is_being_drawn_and_keeps_what_is_finished(tmp_path):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=Path(__file__).parent.parent,
-        env={"PYTHONPATH": str(Path(__file__).parent.parent)},
+        cwd=CLONE,
+        env={"PYTHONPATH": str(CLONE)},
     )
     with process:
         started = time.monotonic()

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-HOUSE = Path(__file__).parent.parent
-RUN = [f for f in sorted((HOUSE / "scenarios").glob("*.py")) if "__main__" in f.read_text()]
+CLONE = Path(__file__).parents[2]
+RUN = [f for f in sorted((CLONE / "scenarios").glob("*.py")) if "__main__" in f.read_text()]
 
 
 @pytest.mark.parametrize("file", RUN, ids=lambda file: file.stem)
@@ -25,7 +25,7 @@ def test_every_scenario_reads_its_arguments_before_it_solves(file):
 def test_a_usage_and_one_line_for_what_is_not_known(tmp_path):
     """Exit 0 with the docstring; exit 2 with a line; nothing solved or written by either."""
     command = [sys.executable, "-m", "scenarios.fold_rectangle"]
-    where = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(HOUSE)}}
+    where = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(CLONE)}}
     text = {"capture_output": True, "text": True, "check": False}
     done = subprocess.run([*command, "--help"], **text, **where)
     assert done.returncode == 0
@@ -142,9 +142,10 @@ def test_hysteresis():
 
 
 def test_picture_of_hysteresis(tmp_path):
-    """Equilibria, loading and unloading of every ring, M above U."""
+    """Equilibria, loading and unloading of every ring, M above U; one row a state in the table."""
+    from der.paper.hysteresis import write_loops
+    from der.paper.hysteresis_plot import figure_of_loops
     from scenarios.hysteresis import loops
-    from scenarios.hysteresis_plot import figure_of_loops, save_loops
 
     figure = figure_of_loops(list(loops.values()))
     assert len(figure.axes) == 2 * len(loops)
@@ -152,10 +153,13 @@ def test_picture_of_hysteresis(tmp_path):
         "equilibria",
         "loading",
         "unloading",
-        "landing",
+        "end state of a snap",
     ]
-    save_loops(list(loops.values())[:1], tmp_path / "loop.png")
-    assert (tmp_path / "loop.png").read_bytes().startswith(b"\x89PNG")
+    (first, *_) = loops.values()
+    picture, table = write_loops([first], tmp_path)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    states = len(first.equilibria) + len(first.turned) + 1  # the top is on both ways
+    assert len(table.read_text().splitlines()) == 1 + states
 
 
 def test_three_ways_to_fall():
