@@ -1,126 +1,149 @@
-"""Following a path of equilibria through its folds, by pseudo-arclength (Riks, Keller).
+"""Follow a path of equilibria through its folds, by pseudo-arclength (Riks, Keller).
 
-The norm is mass-weighted, of rotation vectors and load, and does not depend on the mesh. The
-predictor is the cubic through the last two states (`Step.beyond`); steps are as long as the angle
-between tangents allows.
+The predictor is the cubic through the last two solutions (`Step.beyond`); steps are as long as the
+angle between tangents allows. The norm is the system's own, and does not depend on its mesh.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
-from der.continuation.events import Visit, Wanted, special_points, visit
-from der.continuation.step import Step, Stuck, Tally
-from der.rod.equilibrium import (
-    ADVICE,
-    Control,
-    Direction,
-    Equilibrium,
-    dot,
-    equilibrium,
-    moved,
-)
-from der.rod.gripped_ring import Sector
+from der.continuation.events import Events, located, regular
+from der.continuation.step import Step
+from der.errors import ContinuationFailed, Reason
+from der.problem import PLANE, Increment, Options, Point, S, Solution, Statistics, System
 
-FIRST_STEP = 0.05
-LARGEST_STEP = 0.6
-SMALLEST_STEP = 1e-7
-_ANGLE = 0.12  # rad, aimed at between tangents of neighbouring states
-_SHARPEST = 0.6  # rad, a step that turns more is repeated shorter
 _STRAIGHT = 0.01  # bulge of a step that is believed although its ends are oriented unequally
+_EASY = 4  # Newton iterations; a step that takes more is followed by a shorter one
 
 
-def follow(piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
-    """Hand out the states of the path from the flat ring on, special points in their places.
+def follow(
+    system: System[S],
+    start: S,
+    events: Events[S] | None = None,
+    *,
+    along: Increment | None = None,
+    options: Options | None = None,
+    statistics: Statistics | None = None,
+) -> Iterator[Point[S]]:
+    """Hand out the points of the path through a state, events in their places.
 
-    ``tally`` is counted up on the way.
+    Parameters
+    ----------
+    start : near an equilibrium, at the parameter where the path begins.
+    events : what is looked for, and where the path stops.
+    along : direction in which to set out; default: that of a growing parameter.
+    options : steps and tolerances.
+    statistics : counted up on the way.
 
     Raises
     ------
-    Stuck
-        Where the path cannot be continued, after all that was found has been handed out.
+    ContinuationFailed
+        Where the path cannot be continued, after everything that was found has been handed out.
     """
-    at = equilibrium(piece.body, piece.held, piece.start, tolerance=wanted.tolerance)
-    tally.newton_iterations += at.iterations
-    if not at.converged:
-        raise Stuck(f"the flat ring is no equilibrium: {ADVICE[at.outcome]}")
-    here = visit(piece, wanted, at)
-    yield here
-    before: Step | None = None
-    length = FIRST_STEP
-    while True:
-        if tally.steps >= wanted.most_steps:
-            raise Stuck(f"the path has not ended after {tally.steps} steps")
-        step = _advance(piece, wanted, tally, here.at, before, length)
-        try:
-            found, ended = special_points(piece, wanted, step, here)
-        except Stuck:
-            # both ends are equilibria, but not of one smooth curve: look again from closer
-            if step.length < 4.0 * SMALLEST_STEP:
-                raise
-            length = 0.25 * step.length
-            continue
-        tally.steps += 1
-        before = step
-        angle = _between(piece, here.at, step.end)
-        yield from found
-        here = found[-1]
-        if ended:
-            return
-        ease = math.sqrt(wanted.stride * _ANGLE / max(angle, 1e-3))
-        if step.end.iterations > 4:
+    path = _Path(system, events or Events(), options or Options(), statistics or Statistics())
+    yield from path.points(path.begun(start, along))
+
+
+@dataclass(frozen=True)
+class _Path:
+    """What the steps of one path share."""
+
+    system: System[S]
+    events: Events[S]
+    options: Options
+    statistics: Statistics
+
+    def begun(self, start: S, along: Increment | None) -> Solution[S]:
+        """The equilibrium at the start."""
+        at = self.system.correct(start, along=along, tolerance=self.options.tolerance)
+        self.statistics.newton_iterations += at.iterations
+        if not at.converged:
+            raise ContinuationFailed(
+                f"the start, {self._place(at)}, is no equilibrium: {at.advice}", Reason.NO_START
+            )
+        return at
+
+    def points(self, start: Solution[S]) -> Iterator[Point[S]]:
+        """Points from the start on."""
+        options = self.options
+        here = regular(self.system, self.events, start)
+        yield here
+        before: Step[S] | None = None
+        length = options.first_step
+        while True:
+            if self.statistics.steps >= options.max_steps:
+                raise ContinuationFailed(
+                    f"the path has not ended after {self.statistics.steps} steps",
+                    Reason.TOO_MANY_STEPS,
+                )
+            step = self._advance(here.solution, before, length)
+            try:
+                found, ended = located(self.system, self.events, step, here)
+            except ContinuationFailed:
+                # both ends are equilibria, but not of one smooth curve: look again from closer
+                if step.length < 4.0 * options.smallest_step:
+                    raise
+                length = 0.25 * step.length
+                continue
+            self.statistics.steps += 1
+            before = step
+            yield from found
+            here = found[-1]
+            if ended:
+                return
+            length = self._next_length(step)
+
+    def _next_length(self, step: Step[S]) -> float:
+        """Length of the next step, by how far the tangent has turned and Newton had to iterate."""
+        turn = max(self._angle(step.start, step.end), 1e-3)
+        ease = math.sqrt(self.options.aimed_turn / turn)
+        if step.end.iterations > _EASY:
             ease = min(ease, 0.7)
-        length = min(step.length * min(max(ease, 0.5), 2.0), LARGEST_STEP)
+        return min(step.length * min(max(ease, 0.5), 2.0), self.options.largest_step)
+
+    def _angle(self, a: Solution[S], b: Solution[S]) -> float:
+        """Angle between the tangents at two solutions [rad]."""
+        return math.acos(min(1.0, max(-1.0, self.system.inner(a.tangent, b.tangent))))
+
+    def _advance(self, start: Solution[S], before: Step[S] | None, length: float) -> Step[S]:
+        """One accepted step of about ``length``, shortened until Newton's method follows."""
+        options, reason, advice = self.options, Reason.TOO_SHARP, ""
+        length = max(length, 2.0 * options.smallest_step)
+        while length > options.smallest_step:
+            guess = length * start.tangent if before is None else before.beyond(length)
+            end = self.system.correct(
+                self.system.retract(start.state, guess),
+                along=start.tangent,
+                hold=PLANE,
+                tolerance=options.tolerance,
+                iterations=7,
+            )
+            self.statistics.newton_iterations += end.iterations
+            reason, advice = end.reason, end.advice
+            if end.converged:
+                reason = Reason.TOO_SHARP
+                if self._angle(start, end) < options.sharpest_turn:
+                    step = Step(
+                        self.system, start, end, length, options.tolerance, self.statistics
+                    )
+                    if _orientation(start) == _orientation(end) or step.bulge < _STRAIGHT:
+                        return step
+                    reason = Reason.OTHER_BRANCH
+                advice = reason.value
+            length *= 0.5
+        raise ContinuationFailed(f"no step forward from {self._place(start)}: {advice}", reason)
+
+    def _place(self, at: Solution[S]) -> str:
+        return f"{self.system.parameter_name} = {at.parameter:.8f}"
 
 
-def _between(piece: Sector, a: Equilibrium, b: Equilibrium) -> float:
-    """Angle between the tangents at two states [rad]."""
-    return math.acos(min(1.0, max(-1.0, dot(piece.body, a.tangent, b.tangent))))
-
-
-def _one_way(at: Equilibrium) -> bool:
-    """Orientation of a path: a fold changes the sign of dgamma/ds and the index, and so keeps it.
+def _orientation(at: Solution[S]) -> bool:
+    """Orientation of a path: a fold changes the sign of its rate and the index, and so keeps it.
 
     The determinant of the augmented matrix does not vanish along a path but where another
-    branches off (Keller); two states of unequal sign otherwise lie on two strands of it.
+    branches off (Keller); two solutions of unequal sign otherwise lie on two branches.
     """
-    return (at.negative % 2 == 0) == (at.tangent.load > 0.0)
-
-
-def _advance(
-    piece: Sector,
-    wanted: Wanted,
-    tally: Tally,
-    start: Equilibrium,
-    before: Step | None,
-    length: float,
-) -> Step:
-    """One accepted step of about ``length``, shortened until Newton's method follows."""
-    t = start.tangent
-    reason = ""
-    length = max(length, 2.0 * SMALLEST_STEP)
-    while length > SMALLEST_STEP:
-        if before is None:
-            guess = Direction(length * t.q, length * t.force, length * t.load)
-        else:
-            guess = before.beyond(length)
-        end = equilibrium(
-            piece.body,
-            piece.held,
-            moved(piece.held, start.state, guess),
-            along=t,
-            control=Control.DIRECTION,
-            tolerance=wanted.tolerance,
-            iterations=7,
-        )
-        tally.newton_iterations += end.iterations
-        if end.converged and _between(piece, start, end) < _SHARPEST:
-            step = Step(piece, start, end, length, wanted.tolerance, tally)
-            if _one_way(start) == _one_way(end) or step.bulge < _STRAIGHT:
-                return step
-        reason = ADVICE[end.outcome] if not end.converged else "the path turns too sharply"
-        if end.where >= 0:
-            reason = f"vertex {end.where} {reason}"
-        length *= 0.5
-    raise Stuck(f"no step forward from gamma = {start.state.load:.8f}: {reason}")
+    return ((at.index or 0) % 2 == 0) == (at.parameter_rate > 0.0)

@@ -1,54 +1,58 @@
-"""Where a value turns within a step of a path: folds of the load, limits of the moment."""
+"""Extrema within a step: where a scalar function of the solution turns back.
+
+An extremum of the parameter is a fold, one of an observable a limit point. Two that lie close
+together within one step do not show at its ends; they are looked for where the cubic between two
+solutions is slowest.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from der.continuation.bifurcations import SAME
 from der.continuation.roots import ROOT
-from der.continuation.step import Step
-from der.rod.equilibrium import Equilibrium
+from der.continuation.step import SAME, Step
+from der.problem import Solution
 
 _AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way
 _ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
 _HALVED = 0.25  # of what it was wrong by: on a part of the interval
 
-Found: TypeAlias = tuple[float, Equilibrium]  # a place, and the state there
-Value: TypeAlias = Callable[[Equilibrium], tuple[float, float]]  # and its rate along the path
+Found: TypeAlias = tuple[float, Solution[Any]]  # a place, and the solution there
+Value: TypeAlias = Callable[[Solution[Any]], tuple[float, float]]  # and its rate along the path
 
 
-def of_load(at: Equilibrium) -> tuple[float, float]:
-    """The load, and its rate along the path."""
-    return at.state.load, at.tangent.load
+def of_parameter(at: Solution[Any]) -> tuple[float, float]:
+    """The parameter, and its rate along the path."""
+    return at.parameter, at.parameter_rate
 
 
-def of_moment(at: Equilibrium) -> tuple[float, float]:
-    """The moment, and its rate along the path."""
-    return at.moment, at.moment_rate
+def of_observable(name: str) -> Value:
+    """Return the function of a solution that gives an observable, and its rate along the path."""
+    return lambda at: at.observables[name]
 
 
-def turns(
-    step: Step, low: Found, high: Found, value: Value, along: Value | None = None
+def extrema(
+    step: Step[Any], low: Found, high: Found, value: Value, along: Value | None = None
 ) -> list[Found]:
-    """Places between two, and their states, where a value turns back.
+    """Return places between two, and their solutions, where a value turns back.
 
     Parameters
     ----------
     along : the same value and its rate by s, where that differs from the rate along the path.
     """
-    places = _looked_at(step, low, high, along or value)
+    places = _samples(step, low, high, along or value)
     return [
-        _turn(step, a, b, value)
-        for a, b in pairwise(_cut(step, places, value))
+        _extremum(step, a, b, value)
+        for a, b in pairwise(_bisected(step, places, value))
         if value(a[1])[1] * value(b[1])[1] < 0.0
     ]
 
 
-def _turn(step: Step, low: Found, high: Found, value: Value) -> Found:
-    """The place between two, and its state, where a ``value`` turns: its rate changes sign."""
+def _extremum(step: Step[Any], low: Found, high: Found, value: Value) -> Found:
+    """The place between two, and its solution, where a ``value`` turns: its rate changes sign."""
     (s, a), (t, b) = low, high
     (first, rate), (last, other) = value(a), value(b)
     c1, c2, c3 = _cubic(t - s, last - first, rate, other)
@@ -66,8 +70,8 @@ def _cubic(length: float, jump: float, first: float, last: float) -> tuple[float
     return first, 3.0 * mean - 2.0 * first - last, first + last - 2.0 * mean
 
 
-def _looked_at(
-    step: Step, low: Found, high: Found, value: Value, off: float | None = None
+def _samples(
+    step: Step[Any], low: Found, high: Found, value: Value, off: float | None = None
 ) -> list[Found]:
     """Two places, and those between that tell whether the rate of a value changes sign there.
 
@@ -98,15 +102,15 @@ def _looked_at(
         return [low, middle, high]
     # of third order in the length
     off = _HALVED * abs(found - expected)
-    before = _looked_at(step, low, middle, value, off)
-    return [*before, *_looked_at(step, middle, high, value, off)[1:]]
+    before = _samples(step, low, middle, value, off)
+    return [*before, *_samples(step, middle, high, value, off)[1:]]
 
 
-def _cut(step: Step, places: list[Found], value: Value) -> list[Found]:
+def _bisected(step: Step[Any], places: list[Found], value: Value) -> list[Found]:
     """Places with one more wherever a value changes against its rates at two of them.
 
-    In between the rate has the other sign, on however short a way: by bisection. Where a ring is
-    stretched all but taut, M so leaps from one end of its range to the other.
+    In between the rate has the other sign, on however short a stretch: by bisection. In a ring
+    stretched all but taut, M leaps so from one end of its range to the other.
     """
     cut = places[:1]
     for low, high in pairwise(places):

@@ -1,6 +1,7 @@
-"""What leads from one state to a neighbour, in between and on beyond: the arithmetic of `step`.
+"""The interpolant of a step: a cubic, led through the solutions found within the step.
 
-A path takes some thirty steps, of a few dozen edges: in numpy, calls would cost more than work.
+Increments from the start of a step are flat arrays, so that a path of a few dozen unknowns spends
+its time in arithmetic and not in calls.
 """
 
 from __future__ import annotations
@@ -8,80 +9,18 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from der.kernels.quaternions import Array, chart_rate, rotation_vector
-from der.rod.equilibrium import Direction, product
-from der.rod.rod import State
-from der.rod.supports import Supports
+from der.problem import Array, Increment
 
-_APART = 0.1  # of a step: states that lie closer would tell more of rounding than of the path
-_MOST = 3  # states kept to interpolate between
-
-
-@njit(cache=True)
-def chord(free, quat, stretch, next_quat, next_stretch):
-    """Rotation vectors, and stretch, (n, b) that lead from one state to the next."""
-    n, b = free.shape
-    jump = np.zeros((n, b))
-    turn = rotation_vector(quat, next_quat)
-    for j in range(n):
-        for i in range(b):
-            if free[j, i]:
-                jump[j, i] = turn[j, i] if i < 3 else next_stretch[j] - stretch[j]
-    return jump
-
-
-def between(held: Supports, a: State, b: State) -> Direction:
-    """The increment that leads from one state to another."""
-    q = chord(held.free, a.quat, a.stretch, b.quat, b.stretch)
-    return Direction(q, b.force - a.force, b.load - a.load)
-
-
-@njit(cache=True)
-def _in_frames(jump, rates):
-    """Rates (n, b) of a chord whose end moves at ``rates``, in the frames of its start."""
-    own = rates.copy()
-    turn = chart_rate(jump, rates)
-    for j in range(own.shape[0]):
-        for i in range(3):
-            own[j, i] = turn[j, i]
-    return own
-
-
-@njit(cache=True)
-def end_rates(mass, jump, rates, load_rate, next_rates, next_load_rate):
-    """Rates (n, b) at the end of a chord per length along the tangent at its start, and a factor.
-
-    The factor does the same to those of load and forces. All in the frames of the start.
-    """
-    own = _in_frames(jump, next_rates)
-    factor = 1.0 / (product(mass, rates, own) + load_rate * next_load_rate)
-    return own * factor, factor
-
-
-@njit(cache=True)
-def onward(mass, s, jump, jump_force, jump_load, rates, force_rates, load_rate, t, force_t, load_t):
-    """Increment (n, b), (n_c,) and of the load from the end of a chord to ``s`` beyond.
-
-    By the cubic through both ends, where the rates are ``rates`` and ``t``. All in the frames of
-    the end.
-    """
-    first = _in_frames(-jump, rates)
-    u = s / (product(mass, t, jump) + load_t * jump_load)
-    along = product(mass, t, first) + load_t * load_rate
-    of_start = s * u * (1.0 + u) / along
-    of_end, of_jump = s * (1.0 + u) ** 2, -u * u * (3.0 + 2.0 * u)
-    increment, force = np.empty(jump.shape), np.empty(jump_force.shape)
-    for j in range(jump.shape[0]):
-        for i in range(jump.shape[1]):
-            increment[j, i] = of_end * t[j, i] + of_start * first[j, i] + of_jump * jump[j, i]
-    for k in range(force.shape[0]):
-        force[k] = of_end * force_t[k] + of_start * force_rates[k] + of_jump * jump_force[k]
-    return increment, force, of_end * load_t + of_start * load_rate + of_jump * jump_load
+_APART = 0.1  # of a step: solutions that lie closer would tell more of rounding than of the path
+_MOST = 3  # solutions kept to interpolate between
 
 
 @njit(cache=True)
 def _weights(u, length, places):
-    """Weights (3 + k,), at ``u`` of a ``length``, of the rows of a `Curve` (Hermite, Lagrange)."""
+    """Weights (3 + k,), at ``u`` of a ``length``, of the rows of an interpolant.
+
+    Hermite's for the first three, Lagrange's for the others.
+    """
     k = places.shape[0]
     weights = np.empty(3 + k)
     weights[0] = length * u * (1.0 - u) ** 2
@@ -97,7 +36,7 @@ def _weights(u, length, places):
 
 @njit(cache=True)
 def on_curve(u, length, places, rows):
-    """Increment (m,) to ``u`` of the ``length`` of a curve; see `Curve`.
+    """Increment (m,) to ``u`` of the ``length`` of a step; see `Interpolant`.
 
     Parameters
     ----------
@@ -112,47 +51,33 @@ def on_curve(u, length, places, rows):
     return away
 
 
-class Curve:
-    """The polynomial through a step: a cubic, and what states within it were found to lie off that.
+class Interpolant:
+    """The polynomial through a step: a cubic, and what solutions within it were found off that.
 
-    Increments from its start are rows (m,): frames and stretch, forces and load, one behind
-    another. What a state lies off the cubic is kept over u^2 (1 - u)^2, u = s/length, which
-    vanishes with its rate at both ends.
+    A solution's distance from the cubic is kept over u^2 (1 - u)^2, u = s/length, which vanishes
+    with its rate at both ends.
     """
 
-    def __init__(self, length: float, rate: Direction, jump: Direction, end_rate: Direction):
+    def __init__(self, length: float, rate: Increment, jump: Increment, end_rate: Increment):
         self.length = length
-        self._shape, self._size = rate.q.shape, rate.q.size
-        self._places: list[float] = []  # u of the states
-        # rate at the start, jump, rate at the end, and what the states lie off these
-        self._rows = np.empty((3 + _MOST, self._size + len(rate.force) + 1))
-        for k, d in enumerate((rate, jump, end_rate)):
-            self._set(k, d)
+        self._places: list[float] = []  # u of the solutions
+        # rate at the start, jump, rate at the end, and distances of solutions from the cubic
+        self._rows = np.empty((3 + _MOST, len(jump)))
+        self._rows[0], self._rows[1], self._rows[2] = rate, jump, end_rate
 
-    def _set(self, k: int, d: Direction) -> None:
-        row = self._rows[k]
-        row[: self._size], row[self._size : -1], row[-1] = d.q.ravel(), d.force, d.load
-
-    def _row(self, s: float, known: int) -> Array:
-        """The increment to ``s`` by the cubic and the first ``known`` states, (m,)."""
+    def _at(self, s: float, known: int) -> Increment:
+        """Increment to ``s`` by the cubic and the first ``known`` solutions, (m,)."""
         places = np.array(self._places[:known])
-        row: Array = on_curve(s / self.length, self.length, places, self._rows[: 3 + known])
-        return row
+        increment: Array = on_curve(s / self.length, self.length, places, self._rows[: 3 + known])
+        return increment
 
-    def at(self, s: float) -> Direction:
+    def at(self, s: float) -> Increment:
         """Increment from the start to ``s``."""
-        row, q = self._row(s, len(self._places)), self._size
-        return Direction(row[:q].reshape(self._shape), row[q:-1], float(row[-1]))
+        return self._at(s, len(self._places))
 
-    def load(self, s: float) -> float:
-        """The load of that increment."""
-        return float(self._row(s, len(self._places))[-1])
-
-    def keep(self, s: float, found: Direction) -> None:
-        """Lead through a state ``found`` at ``s``, where that says something new."""
+    def keep(self, s: float, found: Increment) -> None:
+        """Lead through a solution ``found`` at ``s``, where that says something new."""
         u, k = s / self.length, len(self._places)
         if k < _MOST and min(abs(u - place) for place in (0.0, *self._places, 1.0)) >= _APART:
-            self._set(3 + k, found)
-            self._rows[3 + k] -= self._row(s, 0)
-            self._rows[3 + k] /= (u * (1.0 - u)) ** 2
+            self._rows[3 + k] = (found - self._at(s, 0)) / (u * (1.0 - u)) ** 2
             self._places.append(u)

@@ -1,10 +1,10 @@
 """One accepted step of a path as a curve of equilibria.
 
-Between two neighbouring states the path is approximated by a cubic in s, the projection on the
-tangent at the start; the state at any s is the cubic's value, corrected orthogonally to that
-tangent. All that is sought within a step is a root in s, and what is found is an equilibrium. What
-it lies off the cubic, over the u^2 (1 - u)^2 that vanishes with its rate at both ends, is kept, and
-the next state in the step starts from the polynomial through all of them.
+Between two neighbouring solutions the path is approximated by a cubic in s, the projection on the
+tangent at the start; the solution at any s is the cubic's value, corrected orthogonally to that
+tangent. Everything sought within a step is a root in s, and what is found is an equilibrium. Its
+distance from the cubic, over the u^2 (1 - u)^2 that vanishes with its rate at both ends, is kept,
+and the next solution in the step starts from the polynomial through all of them.
 """
 
 from __future__ import annotations
@@ -12,95 +12,76 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Generic
 
-from der.continuation.interpolant import Curve, between, end_rates, onward
-from der.continuation.roots import brent, find_root, smooth_root
-from der.rod.equilibrium import (
-    ADVICE,
-    Control,
-    Direction,
-    Equilibrium,
-    Outcome,
-    dot,
-    equilibrium,
-    moved,
-)
-from der.rod.gripped_ring import Sector
-from der.rod.rod import State
+from der.continuation.interpolant import Interpolant
+from der.continuation.roots import brent, root, smooth_root
+from der.errors import ContinuationFailed, Reason
+from der.problem import PARAMETER, PLANE, Increment, S, Solution, Statistics, System
 
-_ASTRAY = 0.2  # of a step: states that lie farther from its curve are on another branch
-_NEAR = 0.1  # of a step: the same for states at a given load
+SAME = 1e-6  # of a step: singular solutions that lie closer are one solution
+_ASTRAY = 0.2  # of a step: solutions that lie farther from its curve are on another branch
+_NEAR = 0.1  # of a step: the same for solutions at a given parameter
 _ELSEWHERE = 1e-6  # of s: no rounding leads so far, but a mode without stiffness does
 
 
-class Stuck(RuntimeError):
-    """A path that cannot go on; everything found so far has been handed out before."""
-
-
-@dataclass
-class Tally:
-    """What the solve has cost so far."""
-
-    newton_iterations: int = 0
-    steps: int = 0
-    force_evaluations: int = 0  # of dynamic relaxation
-
-
 @dataclass(frozen=True)
-class Step:
-    """The curve between two neighbouring states, s in [0, length]."""
+class Step(Generic[S]):
+    """The curve between two neighbouring solutions, s in [0, length]."""
 
-    piece: Sector
-    start: Equilibrium
-    end: Equilibrium
+    system: System[S]
+    start: Solution[S]
+    end: Solution[S]
     length: float
     tolerance: float
-    tally: Tally
-    jump: Direction = field(init=False)  # from the start to the end
-    end_rate: Direction = field(init=False)  # d jump/ds
-    _found: dict[float, Equilibrium] = field(init=False, default_factory=dict)  # at these s
+    statistics: Statistics
+    jump: Increment = field(init=False)  # from the start to the end
+    end_rate: Increment = field(init=False)  # d jump/ds at the end, in the chart of the start
+    _found: dict[float, Solution[S]] = field(init=False, default_factory=dict)  # at these s
 
     def __post_init__(self) -> None:
-        a, b = self.start, self.end
-        jump, t = self.between(a.state, b.state), b.tangent
-        # d/ds at the end, where s is measured along the tangent at the start, and in its frames
-        q, rate = end_rates(self.piece.body.mass, jump.q, a.tangent.q, a.tangent.load, t.q, t.load)
+        jump = self.system.difference(self.start.state, self.end.state)
+        rate = self.system.transport(jump, self.end.tangent)
+        # s is measured along the tangent at the start
         object.__setattr__(self, "jump", jump)
-        object.__setattr__(self, "end_rate", Direction(q, t.force * rate, t.load * rate))
-
-    def between(self, a: State, b: State) -> Direction:
-        """The increment that leads from one state to another."""
-        return between(self.piece.held, a, b)
+        object.__setattr__(
+            self, "end_rate", rate / self.system.inner(self.start.tangent, rate)
+        )
 
     @cached_property
-    def _curve(self) -> Curve:
-        """The curve from the start to the end, through the states that were found between them."""
-        return Curve(self.length, self.start.tangent, self.jump, self.end_rate)
+    def _curve(self) -> Interpolant:
+        """The curve from the start to the end, through the solutions found between them."""
+        return Interpolant(self.length, self.start.tangent, self.jump, self.end_rate)
 
-    def expected(self, s: float) -> State:
-        """The state at ``s`` as far as the curve tells, not corrected."""
-        return moved(self.piece.held, self.start.state, self._curve.at(s))
+    def expected(self, s: float) -> S:
+        """State at ``s`` by the interpolant, not corrected."""
+        return self.system.retract(self.start.state, self._curve.at(s))
 
-    def beyond(self, s: float) -> Direction:
+    def beyond(self, s: float) -> Increment:
         """Increment from the end to ``s`` beyond it, measured along the tangent there.
 
-        The cubic through both states and tangents, in the frames of the end.
+        By the cubic through both solutions and tangents, in the chart of the end.
         """
-        ways = (*self.jump, *self.start.tangent, *self.end.tangent)
-        return Direction(*onward(self.piece.body.mass, s, *ways))
+        inner, jump, t = self.system.inner, self.jump, self.end.tangent
+        first = self.system.transport(-jump, self.start.tangent)
+        u = s / inner(t, jump)
+        of_start = s * u * (1.0 + u) / inner(t, first)
+        increment: Increment = s * (1.0 + u) ** 2 * t + of_start * first
+        increment -= u * u * (3.0 + 2.0 * u) * jump
+        return increment
 
     @property
     def bulge(self) -> float:
         """How far the end lies beside the tangent at the start, over the length."""
-        square = dot(self.piece.body, self.jump, self.jump)
+        square = self.system.inner(self.jump, self.jump)
         return max(square / self.length**2 - 1.0, 0.0) ** 0.5
 
-    def at(self, s: float) -> Equilibrium:
-        """The equilibrium at ``s``.
+    def at(self, s: float) -> Solution[S]:
+        """Return the equilibrium at ``s``.
 
         Raises
         ------
-        Stuck
+        ContinuationFailed
             Where Newton's method fails, or leads to another branch, although both ends of the step
             are equilibria.
         """
@@ -111,91 +92,81 @@ class Step:
         if s not in self._found:
             expected = self.expected(s)
             found = self.polished(s, expected)
-            away = self.between(expected, found.state)
-            if dot(self.piece.body, away, away) > (_ASTRAY * self.length) ** 2:
-                raise self._stuck(expected, s, Outcome.DIVERGED)
+            away = self.system.difference(expected, found.state)
+            if self.system.inner(away, away) > (_ASTRAY * self.length) ** 2:
+                raise self._failed(s, replace(found, reason=Reason.DIVERGED, detail=""))
             self._found[s] = found
             self._keep(s, found)
         return self._found[s]
 
-    def _keep(self, s: float, found: Equilibrium) -> None:
-        """Lead the curve through a state at ``s``."""
-        self._curve.keep(s, self.between(self.start.state, found.state))
+    def _keep(self, s: float, found: Solution[S]) -> None:
+        """Lead the curve through a solution at ``s``."""
+        self._curve.keep(s, self.system.difference(self.start.state, found.state))
 
     def change(
         self,
-        value: Callable[[Equilibrium], float],
-        low: tuple[float, Equilibrium],
-        high: tuple[float, Equilibrium],
+        value: Callable[[Solution[S]], float],
+        low: tuple[float, Solution[S]],
+        high: tuple[float, Solution[S]],
         guess: float | None = None,
-    ) -> tuple[float, Equilibrium]:
-        """The place between two, and its state, where ``value`` of the state changes its sign.
+    ) -> tuple[float, Solution[S]]:
+        """Return the place between two, and its solution, where ``value`` changes its sign.
 
         ``guess``: a place close to it, where one is known.
         """
         known = dict((low, high))
 
-        def of_place(s: float, step: Step = self) -> float:
+        def of_place(s: float, step: Step[S] = self) -> float:
             if s not in known:
                 known[s] = step.at(s)
             return value(known[s])
 
         s = smooth_root(of_place, low[0], high[0], guess=guess)
         if s is None:
-            # beside a branch point so good a start leaves what has no stiffness as it was: a
-            # worse one, the cubic alone, costs an iteration more that moves it, too
+            # Beside a branch point a start as good as that of the interpolant leaves a mode without
+            # stiffness where it was. The cubic alone is worse: one more iteration moves it, too.
             known = dict((low, high))
             bare = replace(self)
             s = brent(lambda s: of_place(s, bare), low[0], high[0])
         return s, known[s]
 
-    def near(self, s: float) -> State:
-        """A state near the equilibrium at ``s``: the curve with one correction, half the price."""
-        found = equilibrium(
-            self.piece.body,
-            self.piece.held,
-            self.expected(s),
-            along=self.start.tangent,
-            control=Control.DIRECTION,
-            tolerance=0.0,
-            iterations=1,
-        )
-        self.tally.newton_iterations += found.iterations
-        return found.state
+    def near(self, s: float) -> S:
+        """State near the equilibrium at ``s``: the interpolant with one correction."""
+        return self._newton(self.expected(s), tolerance=0.0, iterations=1).state
 
-    def at_load(self, load: float, low: float, high: float) -> tuple[float, Equilibrium]:
-        """The equilibrium at ``load`` between s = low and high, where the load is monotonic."""
+    def at_parameter(self, value: float, low: float, high: float) -> tuple[float, Solution[S]]:
+        """Return the equilibrium at a parameter that is monotonic between s = low and high."""
 
         def expected(s: float) -> float:
-            return self.start.state.load + self._curve.load(s) - load
+            return self._parameter(s) - value
 
         if expected(low) * expected(high) < 0.0:
-            s = find_root(expected, low, high)
-            step = self._curve.at(s)._replace(load=load - self.start.state.load)
-            # the load given, not the one that differences give, to the last bit
-            guess = moved(self.piece.held, self.start.state, step).but(load=load)
-            try:
-                found = self.polished(s, guess, Control.LOAD)
-            except Stuck:
-                found = None
-            if found is not None and self._rises(s) * found.tangent.load > 0.0:
-                away = self.between(guess, found.state)
-                if dot(self.piece.body, away, away) < (_NEAR * self.length) ** 2:
-                    s += dot(self.piece.body, self.start.tangent, away)  # its own projection
+            s = root(expected, low, high)
+            guess = self.expected(s)
+            found = self._newton(guess, PARAMETER, value)
+            if found.converged and self._rises(s) * found.parameter_rate > 0.0:
+                away = self.system.difference(guess, found.state)
+                away[-1] = 0.0  # the root is exact; what is left of it is rounding
+                if self.system.inner(away, away) < (_NEAR * self.length) ** 2:
+                    s += self.system.inner(self.start.tangent, away)  # its own projection
                     self._keep(s, found)
                     return min(max(s, low), high), found
-        # close to a fold: the load is a bad coordinate there, s is not
+        # close to a fold the parameter is a bad coordinate, s is not
         ends = (low, self.at(low)), (high, self.at(high))
-        s, found = self.change(lambda at: at.state.load - load, *ends)
-        return s, replace(found, state=found.state.but(load=load))
+        s, found = self.change(lambda at: at.parameter - value, *ends)
+        return s, replace(found, parameter=value)
+
+    def _parameter(self, s: float) -> float:
+        """Parameter at ``s`` by the interpolant."""
+        return self.start.parameter + float(self._curve.at(s)[-1])
 
     def _rises(self, s: float) -> float:
-        """By how much the load grows around ``s``, to leading order: the sign of its rate."""
+        """By how much the parameter grows around ``s``, to leading order: the sign of its rate."""
         h = 1e-3 * self.length
-        return self._curve.load(s + h) - self._curve.load(s - h)
+        return self._parameter(s + h) - self._parameter(s - h)
 
-    def as_is(self, s: float, state: State) -> Equilibrium:
-        """A ``state`` at ``s`` as the equilibrium that it is to the tolerance, not moved.
+    def as_is(self, s: float, state: S) -> Solution[S]:
+        """Return a ``state`` at ``s`` as the equilibrium that it is to the tolerance, not moved.
 
         At a branch point Newton's method would move it along the mode that has no stiffness. Where
         rounding leaves more than the tolerance it is tried all the same, but not believed if it
@@ -203,46 +174,67 @@ class Step:
 
         Raises
         ------
-        Stuck
+        ContinuationFailed
             Where the state is none and Newton's method, tried then, fails.
         """
-        found = self._newton(state, Control.DIRECTION, iterations=0)
+        found = self._newton(state, iterations=0)
         if found.converged:
             return found
         moved_on = self.polished(s, state)
-        away = self.between(state, moved_on.state)
-        if dot(self.piece.body, away, away) < _ELSEWHERE**2:
+        away = self.system.difference(state, moved_on.state)
+        if self.system.inner(away, away) < _ELSEWHERE**2:
             return moved_on
-        return replace(found, outcome=Outcome.CONVERGED)
+        return replace(found, reason=Reason.CONVERGED)
 
-    def polished(self, s: float, guess: State, control: Control = Control.DIRECTION) -> Equilibrium:
-        """The equilibrium next to a ``guess`` at ``s``.
+    def polished(self, s: float, guess: S) -> Solution[S]:
+        """Return the equilibrium next to a ``guess`` at ``s``.
 
         Raises
         ------
-        Stuck
+        ContinuationFailed
             Where Newton's method fails.
         """
-        found = self._newton(guess, control)
+        found = self._newton(guess)
         if not found.converged:
-            raise self._stuck(guess, s, found.outcome)
+            raise self._failed(s, found)
         return found
 
-    def _stuck(self, guess: State, s: float, outcome: Outcome) -> Stuck:
-        return Stuck(
-            f"no equilibrium within a step, at gamma = {guess.load:.6f}"
-            f" (s = {s:.3g} of {self.length:.3g}): {ADVICE[outcome]}"
+    def _failed(self, s: float, found: Solution[S]) -> ContinuationFailed:
+        place = f"{self.system.parameter_name} = {self._parameter(s):.6f}"
+        return ContinuationFailed(
+            f"no equilibrium within a step, at {place} (s = {s:.3g} of {self.length:.3g}):"
+            f" {found.reason.value}",
+            found.reason,
         )
 
-    def _newton(self, guess: State, control: Control, iterations: int = 12) -> Equilibrium:
-        found = equilibrium(
-            self.piece.body,
-            self.piece.held,
+    def _newton(
+        self,
+        guess: S,
+        hold: str = PLANE,
+        value: float | None = None,
+        iterations: int = 12,
+        tolerance: float | None = None,
+    ) -> Solution[S]:
+        found = self.system.correct(
             guess,
             along=self.start.tangent,
-            control=control,
-            tolerance=self.tolerance,
+            hold=hold,
+            value=value,
+            tolerance=self.tolerance if tolerance is None else tolerance,
             iterations=iterations,
         )
-        self.tally.newton_iterations += found.iterations
+        self.statistics.newton_iterations += found.iterations
         return found
+
+
+def between(
+    system: System[S],
+    a: Solution[S],
+    b: Solution[S],
+    *,
+    tolerance: float,
+    statistics: Statistics,
+) -> Step[S]:
+    """Return the step between two neighbouring solutions, s measured along the first's tangent."""
+    step = Step(system, a, b, 1.0, tolerance, statistics)
+    return replace(step, length=system.inner(a.tangent, step.jump))

@@ -1,4 +1,4 @@
-"""A gripped ring as a rod: the smallest piece that its symmetry allows, or the whole.
+"""A gripped ring as a rod: the smallest sector that its symmetry allows, or the full ring.
 
 The ring lies in the plane (E2, E3) and is twisted about E3 by two grips, at s = 0 (-E3) turning by
 +gamma and at s = L/2 (+E3) by -gamma. A grip holds the edge whose middle it sits on, its frame
@@ -19,7 +19,8 @@ The clamped grips join the arms through the grip distance alone. Hence the modes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,44 +30,60 @@ from der.geometry.mesh import sites
 from der.geometry.ring import Ring
 from der.geometry.section import Section
 from der.kernels.linking import link, unfold, unfold_lengths, vertices
-from der.kernels.quaternions import Array, rotation
-from der.rod.rod import Rod, State, rod
-from der.rod.stability import Stack, SymmetryClass, stack
-from der.rod.supports import Supports, supports
+from der.kernels.quaternions import Array, rotation, rotation_vector
+from der.rod.equilibrium import Equilibrium
+from der.rod.rod import Rod, State, discrete_rod
+from der.rod.stability import SymmetryClass
+from der.rod.supports import Supports, supported
+from der.rod.system import RodSystem
 from der.scene import COPIES, sector_name
 
 E1, E2, E3 = np.eye(3)
+_PLANAR = 1e-6  # a, and turns: a state that is planar
 
 
 @dataclass(frozen=True)
-class Sector:
-    """A piece of a gripped ring, ready to be solved."""
+class GrippedRing(RodSystem):
+    """A gripped ring on one of its symmetry sectors; its load is gamma."""
 
-    name: str
-    copies: int  # how many make the ring
-    body: Rod
-    held: Supports
+    name: str  # of the sector
+    copies: int  # how many of the sector make the ring
     start: State  # the flat ring, gamma = 0
-    classes: dict[str, tuple[int, SymmetryClass]]  # label -> (multiplicity, modes)
+    symmetry: Mapping[str, tuple[int, SymmetryClass]]  # label -> (multiplicity, modes)
     arc_length: Array  # (n,) of the frames along the ring
+    parameter_name: str = field(default="gamma", kw_only=True)
 
     @cached_property
-    def modes(self) -> Stack:
-        """The modes of all classes."""
-        return stack([modes for _, modes in self.classes.values()])
+    def modes(self) -> Mapping[str, SymmetryClass]:
+        """Modes by symmetry class; the first class keeps the symmetry of the sector."""
+        return {label: modes for label, (_, modes) in self.symmetry.items()}
+
+    @cached_property
+    def classes(self) -> Mapping[str, int]:
+        """How often the modes of each class count in the full ring."""
+        return {label: count for label, (count, _) in self.symmetry.items()}
+
+    @property
+    def length(self) -> float:
+        """Length of the full ring."""
+        return self.copies * float(self.rod.length.sum())
 
     @cached_property
     def turning(self) -> float:
         """Mass of the frames that turn with the load, times the square of how fast."""
-        return float(self.body.mass[:, 0] @ self.held.turn**2)
+        return float(self.rod.mass[:, 0] @ self.supports.turn**2)
 
-    def moment(self, generalised: float) -> float:
-        """M of one arm, from dL/dgamma of the piece: M = (1/4) dU/dgamma of the full ring."""
-        return 0.25 * self.copies * generalised
+    def arm_moment(self, conjugate: float) -> float:
+        """M of one arm, from dL/dgamma of the sector: M = (1/4) dU/dgamma of the full ring."""
+        return 0.25 * self.copies * conjugate
+
+    def values(self, at: Equilibrium) -> tuple[float, float, float]:
+        """Return gamma [rad], M of one arm [GJ/a] and U of the full ring [GJ/a]."""
+        return at.parameter, self.arm_moment(at.moment), self.copies * at.energy
 
     def lengths(self, state: State) -> Array:
         """Present lengths (n,) of the sector's edges."""
-        return self.body.length * (1.0 + state.stretch)
+        return self.rod.length * (1.0 + state.stretch)
 
     def full_frames(self, state: State) -> Array:
         """Frames (N, 4) of all edges of the ring, from the first grip on."""
@@ -93,8 +110,31 @@ class Sector:
         """Linking number of the ring."""
         return link(state.quat, self.lengths(state), self.copies)[0]
 
+    def turning_number(self, state: State) -> int | None:
+        """How often the tangent of a planar state turns, to 1e-6, < 0 flipped; None: not planar."""
+        x = self.vertices(state)
+        quat = state.quat
+        # not the strains: some measures of curvature are no angles
+        angle = rotation_vector(quat, np.roll(quat, -1, axis=0))[: len(self.rod.cell), 0]
+        count = self.copies * float(angle.sum()) / (2.0 * np.pi)
+        planar = float(np.ptp(x[:, 0])) < _PLANAR and abs(count - round(count)) < _PLANAR
+        return round(count) if planar else None
 
-def sector(
+    def folded(self, state: State) -> bool:
+        """Whether a state is the folded ring: planar, three-covered."""
+        return self.turning_number(state) == 3
+
+    def overlaps(self, state: State) -> bool:
+        """Whether a state is planar and crosses or covers itself: then no link is defined."""
+        return self.turning_number(state) not in (None, 1, -1)
+
+    def own_class(self) -> GrippedRing:
+        """Return the same with only the modes that the sector itself can follow."""
+        first = next(iter(self.symmetry))
+        return replace(self, symmetry={first: self.symmetry[first]})
+
+
+def gripped_ring(
     ring: Ring,
     section: Section,
     n_edges: int,
@@ -102,8 +142,8 @@ def sector(
     name: str = "auto",
     measure: str = "logarithm",
     stretching: float = 0.0,
-) -> Sector:
-    """The sector of a gripped ring with ``n_edges`` edges in the full ring.
+) -> GrippedRing:
+    """Return a sector of a gripped ring with ``n_edges`` edges in the full ring.
 
     Parameters
     ----------
@@ -119,7 +159,7 @@ def sector(
     joints = sites(ring, n_edges, name)
     closed = name == "full"
     s = joints[:-1] if closed else joints
-    body = rod(
+    rod = discrete_rod(
         np.diff(joints),
         np.diff(ring.natural_angle(joints)),
         (section.alpha, section.beta, 1.0),
@@ -129,9 +169,9 @@ def sector(
     )
     angle = 0.5 * (ring.angle(s) - 0.5 * np.pi)  # half the turn about E1 from d3 = E3
     quat = np.stack([np.cos(angle), np.sin(angle), 0.0 * s, 0.0 * s], axis=1)
-    held, classes = {"full": _full, "half": _half, "quarter": _quarter}[name](body)
-    start = State(quat, np.zeros(len(s)), np.zeros(len(held.target)), 0.0)
-    return Sector(name, COPIES[name], body, held, start, classes, s)
+    supports, classes = {"full": _full, "half": _half, "quarter": _quarter}[name](rod)
+    start = State(quat, np.zeros(len(s)), np.zeros(len(supports.target)), 0.0)
+    return GrippedRing(rod, supports, name, COPIES[name], start, classes, s)
 
 
 Classes = dict[str, tuple[int, SymmetryClass]]
@@ -141,54 +181,54 @@ def _class(free: NDArray[np.bool_], weight: Array, *axes: Array) -> SymmetryClas
     return SymmetryClass(free, np.array([weight] * len(axes)), np.array(axes))
 
 
-def _full(body: Rod) -> tuple[Supports, Classes]:
-    n, half = body.n_edges, body.n_edges // 2
+def _full(rod: Rod) -> tuple[Supports, Classes]:
+    n, half = rod.n_edges, rod.n_edges // 2
     arm = np.zeros((2, n))
     arm[0, 1:half] = 1.0
     arm[1, half + 1 :] = 1.0
     arm[:, [0, half]] = 0.5
     conditions = [(arm[k], axis, 0.0) for k in (0, 1) for axis in (E1, E2)]
     conditions.append((arm[0] + arm[1], E3, 0.0))  # both arms span the same grip distance
-    held = supports(body, clamped=(0, half), held=tuple(conditions), turn={0: 1.0, half: -1.0})
-    return held, {"all": (1, SymmetryClass(held.free, held.weight, held.axis))}
+    supports = supported(rod, clamped=(0, half), held=tuple(conditions), turn={0: 1.0, half: -1.0})
+    return supports, {"all": (1, SymmetryClass(supports.free, supports.weight, supports.axis))}
 
 
-def _half(body: Rod) -> tuple[Supports, Classes]:
-    end = body.n_edges - 1
+def _half(rod: Rod) -> tuple[Supports, Classes]:
+    end = rod.n_edges - 1
     one = np.ones(end + 1)
-    held = supports(
-        body,
+    supports = supported(
+        rod,
         clamped=(0, end),
         held=((one, E1, 0.0), (one, E2, 0.0)),
         turn={0: 1.0, end: -1.0},
     )
-    return held, {
-        "in phase": (1, _class(held.free, one, E1, E2)),
-        "out of phase": (1, _class(held.free, one, E1, E2, E3)),
+    return supports, {
+        "in phase": (1, _class(supports.free, one, E1, E2)),
+        "out of phase": (1, _class(supports.free, one, E1, E2, E3)),
     }
 
 
-def _quarter(body: Rod) -> tuple[Supports, Classes]:
-    end = body.n_edges - 1
+def _quarter(rod: Rod) -> tuple[Supports, Classes]:
+    end = rod.n_edges - 1
     one = np.ones(end + 1)
-    held = supports(body, clamped=(end,), held=((one, E1, 0.0),), turn={end: -1.0})
-    odd = held.free.copy()
+    supports = supported(rod, clamped=(end,), held=((one, E1, 0.0),), turn={end: -1.0})
+    odd = supports.free.copy()
     # the free point: a mode that the half-turn keeps turns about d2 = E2 there, others about d1, d3
-    held.free[0] = [False, True, False, True][: body.block]
-    odd[0] = [True, False, True, False][: body.block]
-    return held, {
-        "in phase": (1, _class(held.free, one, E1)),
-        "out of phase": (1, _class(held.free, one, E1, E3)),
+    supports.free[0] = [False, True, False, True][: rod.block]
+    odd[0] = [True, False, True, False][: rod.block]
+    return supports, {
+        "in phase": (1, _class(supports.free, one, E1)),
+        "out of phase": (1, _class(supports.free, one, E1, E3)),
         "odd": (2, _class(odd, one, E2)),
     }
 
 
-def free_ring(body: Rod) -> Supports:
+def free_ring(rod: Rod) -> Supports:
     """Supports of a closed rod without grips: it has to stay closed, and nothing else.
 
-    The frame of edge 0 is held, which takes out rigid rotations; translations are no unknowns.
+    The frame of edge 0 is supports, which takes out rigid rotations; translations are no unknowns.
     """
-    one = np.ones(body.n_edges)
-    held = supports(body, clamped=(0,), held=((one, E1, 0.0), (one, E2, 0.0), (one, E3, 0.0)))
-    held.free[0, 3:] = True
-    return held
+    one = np.ones(rod.n_edges)
+    supports = supported(rod, clamped=(0,), held=((one, E1, 0.0), (one, E2, 0.0), (one, E3, 0.0)))
+    supports.free[0, 3:] = True
+    return supports

@@ -57,7 +57,7 @@ class State(NamedTuple):
         return self._replace(**changes)  # type: ignore[arg-type]
 
 
-def rod(
+def discrete_rod(
     cell: Array,
     rest: Array,
     stiffness: tuple[float, float, float],

@@ -34,7 +34,7 @@ class Supports(NamedTuple):
     reach: Array  # (n,) length of the edge per unit of load, beyond its own
 
 
-def supports(
+def supported(
     body: Rod,
     *,
     clamped: tuple[int, ...] = (),

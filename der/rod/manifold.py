@@ -1,0 +1,113 @@
+"""Increments of a rod's configuration: from one to another, and to a neighbour.
+
+A configuration is frames, stretches, forces and the load. Frames are rotations, so an increment is
+a rotation vector in each frame; a rate at the end of an increment is turned back to its start.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from der.kernels.quaternions import Array, chart_rate, into_frame, rotation_vector, turned
+from der.problem import Increment
+from der.rod.rod import State
+from der.rod.supports import Supports
+
+
+class Direction(NamedTuple):
+    """The parts of an increment; views of the flat array where they come from `split`."""
+
+    q: Array  # (n, b) rotation vectors in the frames, and stretch
+    force: Array  # (n_c,)
+    load: float
+
+    @property
+    def flat(self) -> Increment:
+        """The same as one array (m,)."""
+        return np.concatenate([self.q.ravel(), self.force, [self.load]])
+
+
+def split(supports: Supports, increment: Increment) -> Direction:
+    """Return the parts of an increment of a rod on these supports."""
+    size = supports.free.size
+    q = increment[:size].reshape(supports.free.shape)
+    return Direction(q, increment[size:-1], float(increment[-1]))
+
+
+@njit(cache=True)
+def product(weight, a, b):
+    """Inner product of two increments (m,): mass-weighted rotations and stretches, and the load."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += weight[i] * a[i] * b[i]
+    return total
+
+
+@njit(cache=True)
+def difference(free, quat, stretch, force, load, next_quat, next_stretch, next_force, next_load):
+    """Increment (m,) that leads from one configuration to the next."""
+    n, b = free.shape
+    m = force.shape[0]
+    jump = np.zeros(n * b + m + 1)
+    turn = rotation_vector(quat, next_quat)
+    for j in range(n):
+        for i in range(b):
+            if free[j, i]:
+                jump[j * b + i] = turn[j, i] if i < 3 else next_stretch[j] - stretch[j]
+    for k in range(m):
+        jump[n * b + k] = next_force[k] - force[k]
+    jump[n * b + m] = next_load - load
+    return jump
+
+
+@njit(cache=True)
+def transport(n, b, jump, rates):
+    """Rates (m,) at the end of an increment, in the frames of its start."""
+    own = rates.copy()
+    turn = chart_rate(jump[: n * b].reshape((n, b)), rates[: n * b].reshape((n, b)))
+    for j in range(n):
+        for i in range(3):
+            own[j * b + i] = turn[j, i]
+    return own
+
+
+@njit(cache=True)
+def move(turn, turn_axis, quat, stretch, force, increment):
+    """Add an increment (m,) to frames (n, 4), stretch (n,) and forces (n_c,), in place.
+
+    The frames that turn with the load turn about a fixed axis, so theirs is exact at any angle.
+    """
+    n, m = quat.shape[0], force.shape[0]
+    b = (increment.shape[0] - m - 1) // n
+    load = increment[n * b + m]
+    axis = np.empty(3)
+    for j in range(n):
+        for i in range(3):
+            axis[i] = increment[j * b + i]
+        if turn[j] != 0.0:
+            into_frame(quat[j], turn_axis, axis)
+            for i in range(3):
+                axis[i] *= turn[j] * load
+        turned(quat[j], axis, quat[j])
+        if b == 4:
+            stretch[j] += increment[j * b + 3]
+    for k in range(m):
+        force[k] += increment[n * b + k]
+
+
+@njit(cache=True)
+def _retract(turn, turn_axis, quat, stretch, force, increment):
+    quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
+    move(turn, turn_axis, quat, stretch, force, increment)
+    return quat, stretch, force
+
+
+def retract(supports: Supports, state: State, increment: Increment) -> State:
+    """Return ``state`` moved by an increment."""
+    quat, stretch, force = _retract(
+        supports.turn, supports.turn_axis, state.quat, state.stretch, state.force, increment
+    )
+    return State(quat, stretch, force, state.load + float(increment[-1]))
