@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeAlias, TypeVar
+from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ Increment: TypeAlias = Array  # (m,) unknowns, multipliers, and the parameter la
 Indices: TypeAlias = tuple[int | None, ...]  # one a symmetry class, multiplicities not yet applied
 
 S = TypeVar("S")  # a configuration: frames, angles, numbers, ...
+A = TypeVar("A", bound="Solution[Any]")
 
 # Conditions that close the equations of equilibrium; any other is the name of an observable.
 PARAMETER = "parameter"  # it has a given value
@@ -174,10 +175,10 @@ class Statistics:
 
 
 @dataclass(frozen=True)
-class Point(Generic[S]):
+class Point(Generic[A]):
     """A solution on the path, as it is handed out."""
 
-    solution: Solution[S]
+    solution: A
     kind: str = ""  # "", "fold", "limit", "branch", or the kind of a further event
     index: Indices | None = None
     stiffness: tuple[float, ...] = ()  # of the softest mode of each class, where index is known

@@ -26,9 +26,9 @@ from der.analysis.matching import (
     romberg,
 )
 from der.analysis.moved_folds import arc_lengths
-from der.continuation.events import Visit
+from der.continuation.events import Point
 from der.kernels.quaternions import Array
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 
 _EXACT = 1e-9  # of the largest values: a state that is the same on every mesh, as the folded one
 _REST = 3.0  # see `_Corrections.bound`
@@ -42,7 +42,7 @@ class ErrorBars:
     Where a level has no state, errors are None and the values are those of N edges.
     """
 
-    order: tuple[int, ...]  # (n,) positions among the visits; see `error_bars` for what is missing
+    order: tuple[int, ...]  # (n,) positions among the points; see `error_bars` for what is missing
     gamma: Array  # (n,) rad
     moment: Array  # (n,) GJ/a, of one arm
     energy: Array  # (n,) GJ/a, of the full ring
@@ -67,8 +67,8 @@ class ErrorBars:
 
 
 def error_bars(
-    pieces: Sequence[Sector],
-    visits: Sequence[Visit],
+    rings: Sequence[GrippedRing],
+    points: Sequence[Point],
     asked: Collection[float],
     *,
     tolerance: float = 1e-10,
@@ -77,8 +77,8 @@ def error_bars(
 
     Parameters
     ----------
-    pieces : the sector at the three levels, finest first (`scene.meshes`).
-    visits : the path on the finest, from `path.follow`.
+    rings : the sector at the three levels, finest first (`scene.meshes`).
+    points : the path on the finest, from `path.follow`.
     asked : values of gamma that states were solved for [rad]: there gamma stays what it is and
         moment and energy become those at this gamma on the extrapolated curve.
     tolerance : of the residual of an equilibrium, GJ/a.
@@ -90,18 +90,18 @@ def error_bars(
     would be that of the other side. Branch and contact points are placed on N edges only; they have
     values on the extrapolated curve, but no errors.
     """
-    family = Family(tuple(pieces), tolerance)
-    places = list(placed(family, visits, asked))
-    order = _order(arc_lengths(pieces[0], visits), places)
-    scales = _scales(family, visits)
+    family = Family(tuple(rings), tolerance)
+    places = list(placed(family, points, asked))
+    order = _order(arc_lengths(rings[0], points), places)
+    scales = _scales(family, points)
     kept = [places[k] for k in order]
     corrections = _Corrections.of(kept, scales)
     bounds = [corrections.bound(k) for k in range(len(kept))]
-    raw = np.array([family.values(0, visits[k].at) for k in order]).reshape(-1, RATE)
+    raw = np.array([family.values(0, points[k].solution) for k in order]).reshape(-1, RATE)
     values = np.array(
         [r if p is None else p.values for p, r in zip(kept, raw, strict=True)]
     ).reshape(-1, RATE)
-    slope, slope_error = _slope_at_pi(kept, [visits[k] for k in order], corrections)
+    slope, slope_error = _slope_at_pi(kept, [points[k] for k in order], corrections)
     errors: list[list[float | None]] = [
         [None if b is None else float(b[c]) for b in bounds] for c in range(RATE)
     ]
@@ -116,12 +116,12 @@ def error_bars(
         dict(zip(("gamma", "moment", "energy"), raw.T.tolist(), strict=True)),
         slope,
         slope_error,
-        _how(pieces, bounds),
+        _how(rings, bounds),
     )
 
 
 def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
-    """Positions of the visits in their order on the extrapolated curve, without overtaken ones."""
+    """Positions of the points in their order on the extrapolated curve, without overtaken ones."""
     at = [s + (0.0 if p is None else p.s) for s, p in zip(lengths, places, strict=True)]
     fixed = [p is not None and p.fixed for p in places]
     before = accumulate((a if f else -math.inf for a, f in zip(at, fixed, strict=True)), max)
@@ -138,9 +138,9 @@ def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
     return sorted(kept, key=lambda k: at[k])
 
 
-def _scales(family: Family, visits: Sequence[Visit]) -> Array:
+def _scales(family: Family, points: Sequence[Point]) -> Array:
     """What the columns of a table are measured in (6,): pi and the largest |M| and |U|."""
-    values = np.array([family.values(0, visit.at) for visit in visits]).reshape(-1, RATE)
+    values = np.array([family.values(0, point.solution) for point in points]).reshape(-1, RATE)
     largest = np.abs(values).max(axis=0, initial=0.0)
     largest[GAMMA] = math.pi
     return np.tile(np.where(largest > 0.0, largest, 1.0), 2)
@@ -197,10 +197,10 @@ class _Corrections:
 
 
 def _slope_at_pi(
-    places: Sequence[Place | None], visits: Sequence[Visit], corrections: _Corrections
+    places: Sequence[Place | None], points: Sequence[Point], corrections: _Corrections
 ) -> tuple[float | None, float | None]:
     """dM/dgamma at the first arrival at pi, and its error."""
-    found = [k for k, v in enumerate(visits) if v.kind == "" and v.at.state.load == math.pi]
+    found = [k for k, v in enumerate(points) if v.kind == "" and v.solution.parameter == math.pi]
     place = places[found[0]] if found else None
     if place is None:
         return None, None
@@ -216,9 +216,9 @@ def _slope_at_pi(
     return float(twice), float(error)
 
 
-def _how(pieces: Sequence[Sector], bounds: Sequence[Array | None]) -> str:
+def _how(rings: Sequence[GrippedRing], bounds: Sequence[Array | None]) -> str:
     """How the errors were found, in a sentence."""
-    sizes = ", ".join(str(_edges(piece)) for piece in pieces)
+    sizes = ", ".join(str(_edges(ring)) for ring in rings)
     text = (
         f"Romberg extrapolation from {sizes} edges, states matched in the planes normal to the path"
         " of the finest; an error is the last correction, the largest of a state and its"
@@ -228,12 +228,12 @@ def _how(pieces: Sequence[Sector], bounds: Sequence[Array | None]) -> str:
     if missing:
         text += (
             f"; null at {missing} of {len(bounds)} states: a coarser mesh has no such state, or it"
-            f" is a branch or contact point, whose place on the path is that of {_edges(pieces[0])}"
+            f" is a branch or contact point, whose place on the path is that of {_edges(rings[0])}"
             " edges"
         )
     return text
 
 
-def _edges(piece: Sector) -> int:
+def _edges(ring: GrippedRing) -> int:
     """Edges of the full ring."""
-    return len(piece.body.cell) * piece.copies
+    return len(ring.rod.cell) * ring.copies

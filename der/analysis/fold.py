@@ -13,8 +13,8 @@ import numpy as np
 
 from der.analysis.self_crossing import gap, nearest_strands
 from der.continuation.arclength import follow
-from der.continuation.events import EIGHTH, Visit, Wanted, full_index, three_covered
-from der.continuation.step import Stuck, Tally
+from der.continuation.events import EIGHTH, Point, Wanted, full_index, three_covered
+from der.continuation.step import ContinuationFailed, Statistics
 from der.errors import STOPPED, Interrupted, NotConverged
 from der.geometry.mesh import sites
 from der.geometry.ring import circle
@@ -24,7 +24,7 @@ from der.kernels.quaternions import Array
 from der.records.configurations import Shapes
 from der.records.path import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode, release
 from der.rod.equilibrium import equilibrium
-from der.rod.gripped_ring import Sector, free_ring, sector
+from der.rod.gripped_ring import GrippedRing, free_ring, sector
 from der.rod.rod import State
 from der.rod.stability import all_modes, index
 from der.scene import Scene, meshes
@@ -67,7 +67,7 @@ def fold(
     """
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a der.Scene, got {shown(scene)}")
-    piece = _piece(scene, scene.n_edges, scene.sector)
+    ring = _piece(scene, scene.n_edges, scene.sector)
     until_folded = scene.until == "folded"
     beyond = scene.gamma_max > math.pi
     counting = scene.stability or scene.looks_for_contacts
@@ -81,34 +81,34 @@ def fold(
         contacts=scene.looks_for_contacts,
         tolerance=scene.tolerance,
     )
-    tally = Tally()
-    visits: list[Visit] = []
+    statistics = Statistics()
+    points: list[Point] = []
     started = time.perf_counter()
 
     def entries(status: str, message: str = "") -> dict[str, Any]:
-        timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
-        return _entries(scene, piece, visits, timing, status, message)
+        timing = Timing(time.perf_counter() - started, statistics.newton_iterations, statistics.steps)
+        return _entries(scene, ring, points, timing, status, message)
 
     with interrupts_between_states() as pressed:
         try:
             _load_kernels(wanted.stability, wanted.contacts, snaps=scene.control != "arclength")
             started = time.perf_counter()
-            for visit in _march(scene, piece, wanted, tally):
-                visits.append(visit)
+            for point in _march(scene, ring, wanted, statistics):
+                points.append(point)
                 if progress is not None:
-                    progress(visit.at.state.load)
+                    progress(point.solution.parameter)
                 if watch is not None:
-                    watch(piece.vertices(visit.at.state))
+                    watch(ring.vertices(point.solution.state))
                 if pressed:
                     raise KeyboardInterrupt
-            message = NEVER if visits[-1].at.state.load == -scene.gamma_max else ""
+            message = NEVER if points[-1].solution.parameter == -scene.gamma_max else ""
 
             def done() -> dict[str, Any]:
                 return entries("done", message)
 
             bars = scene.error_bars
-            found = _with_error_bars(scene, piece, wanted, visits, done) if bars else done()
-        except Stuck as stuck:
+            found = _with_error_bars(scene, ring, wanted, points, done) if bars else done()
+        except ContinuationFailed as stuck:
             raise NotConverged(str(stuck), Path(**entries("not converged", str(stuck)))) from None
         except KeyboardInterrupt:
             pressed.clear()  # one more must not lose what there is
@@ -118,9 +118,9 @@ def fold(
     return Path(**found)
 
 
-def _piece(scene: Scene, n_edges: int, name: str) -> Sector:
+def _piece(scene: Scene, n_edges: int, name: str) -> GrippedRing:
     """A sector of the scene's ring with ``n_edges`` edges in the full ring."""
-    return sector(
+    return gripped_ring(
         scene.ring,
         scene.section,
         n_edges,
@@ -132,9 +132,9 @@ def _piece(scene: Scene, n_edges: int, name: str) -> Sector:
 
 def _with_error_bars(
     scene: Scene,
-    piece: Sector,
+    ring: GrippedRing,
     wanted: Wanted,
-    visits: list[Visit],
+    points: list[Point],
     entries: Callable[[], dict[str, Any]],
 ) -> dict[str, Any]:
     """The record's entries with the values extrapolated from three meshes, and their errors.
@@ -148,27 +148,27 @@ def _with_error_bars(
     from der.analysis.matching import Family
     from der.analysis.moved_folds import all_asked
 
-    coarse = [_piece(scene, n, piece.name) for n in meshes(scene.n_edges, piece.name)[1:]]
-    end = _end(coarse[-1], replace(wanted, most_steps=4 * len(visits) + 100))
-    if end != visits[-1].at.state.load:
+    coarse = [_piece(scene, n, ring.name) for n in meshes(scene.n_edges, ring.name)[1:]]
+    end = _end(coarse[-1], replace(wanted, most_steps=4 * len(points) + 100))
+    if end != points[-1].solution.parameter:
         return _without_errors(entries(), scene.n_edges // 4, end)
     asked = {math.pi, scene.gamma_max, -scene.gamma_max}
     if scene.save_at is not None:
         asked |= set(scene.save_at)
     else:
-        last = max(abs(visit.at.state.load) for visit in visits)
+        last = max(abs(point.solution.parameter) for point in points)
         most = math.ceil(last / EIGHTH)
         asked |= {k * EIGHTH for k in range(-most, most + 1)}
-    family = Family((piece, *coarse), scene.tolerance)
-    visits[:] = all_asked(family, wanted, visits, asked)
-    bars = error_bars(family.pieces, visits, asked, tolerance=scene.tolerance)
+    family = Family((ring, *coarse), scene.tolerance)
+    points[:] = all_asked(family, wanted, points, asked)
+    bars = error_bars(family.rings, points, asked, tolerance=scene.tolerance)
     place = {k: i for i, k in enumerate(bars.order)}
-    singular = [k for k in place if visits[k].kind in ("fold", "branch")]
-    for k, visit in enumerate(visits):
+    singular = [k for k in place if points[k].kind in ("fold", "branch")]
+    for k, point in enumerate(points):
         if k in place and any((place[s] < place[k]) != (s < k) for s in singular):
             # it lay on the other side of a singular state: the meshes do not agree on its index
-            visits[k] = replace(visit, index=None, sides=None)
-    visits[:] = [visits[k] for k in bars.order]
+            points[k] = replace(point, index=None, sides=None)
+    points[:] = [points[k] for k in bars.order]
     found = entries()
 
     def at(k: int) -> dict[str, float]:
@@ -191,14 +191,14 @@ def _with_error_bars(
     }
 
 
-def _end(piece: Sector, wanted: Wanted) -> float | None:
+def _end(ring: GrippedRing, wanted: Wanted) -> float | None:
     """The load at which a path ends; None where it cannot be followed."""
     bare = replace(
         wanted, targets=(), limits=False, stride=_STRIDE, stability=False, contacts=False
     )
     try:
-        return [visit.at.state.load for visit in follow(piece, bare, Tally())][-1]
-    except Stuck:
+        return [point.solution.parameter for point in follow(ring, bare, Statistics())][-1]
+    except ContinuationFailed:
         return None
 
 
@@ -214,7 +214,7 @@ def _without_errors(found: dict[str, Any], n_edges: int, end: float | None) -> d
     return found | {"error": unknown | {"slope_at_pi": None, "how": how}, "raw": raw}
 
 
-def _march(scene: Scene, piece: Sector, wanted: Wanted, tally: Tally) -> Iterator[Visit]:
+def _march(scene: Scene, ring: GrippedRing, wanted: Wanted, statistics: Statistics) -> Iterator[Point]:
     """The states of the path, in the way in which the scene is controlled and solved.
 
     What a scene does not need is not imported either.
@@ -225,63 +225,63 @@ def _march(scene: Scene, piece: Sector, wanted: Wanted, tally: Tally) -> Iterato
 
         # no Hessian anywhere: neither index nor link is looked for between states
         bare = replace(wanted, stability=False, contacts=False)
-        return follow_relaxed(piece, bare, tally, unload=scene.unload, every=every)
+        return follow_relaxed(ring, bare, statistics, unload=scene.unload, every=every)
     if scene.control == "angle":
         from der.analysis.loading import follow_angle
 
-        return follow_angle(piece, wanted, tally, unload=scene.unload, every=every)
+        return follow_angle(ring, wanted, statistics, unload=scene.unload, every=every)
     if scene.control == "moment":
         from der.analysis.loading import follow_moment
 
-        return follow_moment(piece, wanted, tally, unload=scene.unload, every=every)
-    return follow(piece, wanted, tally)
+        return follow_moment(ring, wanted, statistics, unload=scene.unload, every=every)
+    return follow(ring, wanted, statistics)
 
 
 @cache
 def _load_kernels(stability: bool, contacts: bool, *, snaps: bool) -> None:
     """Load or compile the kernels that a path needs, once a process, before the clock starts."""
-    piece = sector(circle(), section(1.0, 1.0), 8)
+    ring = gripped_ring(circle(), section(1.0, 1.0), 8)
     if snaps:
         from der.rod.relaxation import relax
 
-        relax(piece.body, piece.held, piece.start)
-    for _ in follow(piece, Wanted(load_max=0.1, stability=stability, contacts=contacts), Tally()):
+        relax(ring, ring.start)
+    for _ in follow(ring, Wanted(load_max=0.1, stability=stability, contacts=contacts), Statistics()):
         pass
     if contacts:
-        x = piece.vertices(piece.start)
+        x = ring.vertices(ring.start)
         gap(x, *nearest_strands(x, x))
 
 
 def _entries(
     scene: Scene,
-    piece: Sector,
-    visits: list[Visit],
+    ring: GrippedRing,
+    points: list[Point],
     timing: Timing,
     status: str,
     message: str,
 ) -> dict[str, Any]:
     """The entries of the record of what was visited."""
-    indices = [full_index(piece, visit.index) for visit in visits]
-    moments = np.array([piece.moment(visit.at.moment) for visit in visits])
-    points = tuple(_points(piece, visits))
+    indices = [total_index(ring, point.index) for point in points]
+    moments = np.array([ring.moment(point.solution.moment) for point in points])
+    points = tuple(_points(ring, points))
     at_pi = mode = None
-    for k, visit in enumerate(visits):
-        if visit.at.state.load == math.pi:
+    for k, point in enumerate(points):
+        if point.solution.parameter == math.pi:
             at_rest = abs(moments[k]) <= _NO_MOMENT * float(np.abs(moments).max())
-            free = _free_index(scene, piece, visit) if at_rest and visit.index else None
+            free = _free_index(scene, ring, point) if at_rest and point.index else None
             at_pi = AtPi(
                 float(moments[k]),
-                piece.moment(visit.at.slope),
-                piece.copies * visit.at.energy,
+                ring.moment(point.solution.slope),
+                ring.copies * point.solution.energy,
                 indices[k],
-                _moment_index(visit, indices[k]),
+                _moment_index(point, indices[k]),
                 free,
             )
             end = slice(0, k + 1)
             before = tuple(point for point in points if point.position <= k)
-            gamma = np.array([v.at.state.load for v in visits[end]])
+            gamma = np.array([v.solution.parameter for v in points[end]])
             mode = folding_mode(
-                gamma, moments[end], before, at_pi, three_covered=three_covered(piece, visit.at)
+                gamma, moments[end], before, at_pi, three_covered=three_covered(ring, point.solution)
             )
             break
     if message == NEVER and at_pi is None:
@@ -292,19 +292,19 @@ def _entries(
         "solver": "der",
         "ring": scene.ring.to_json(),
         "section": asdict(scene.section),
-        "numerics": _numerics(scene, piece),
-        "gamma": np.array([visit.at.state.load for visit in visits]),
+        "numerics": _numerics(scene, ring),
+        "gamma": np.array([point.solution.parameter for point in points]),
         "moment": moments,
-        "energy": np.array([piece.copies * visit.at.energy for visit in visits]),
+        "energy": np.array([ring.copies * point.solution.energy for point in points]),
         "index": counts("index", indices),
-        "index_moment": counts("index_moment", list(map(_moment_index, visits, indices))),
+        "index_moment": counts("index_moment", list(map(_moment_index, points, indices))),
         "points": points,
         "at_pi": at_pi,
         "mode": mode,
         "error": None,
         "timing": timing,
         # an unfinished path keeps its shapes in any case: they are what it got to
-        "shapes": _shapes(scene, piece, visits, status)
+        "shapes": _shapes(scene, ring, points, status)
         if scene.shapes or status != "done"
         else None,
         "status": status,
@@ -312,67 +312,67 @@ def _entries(
     }
 
 
-def _moment_index(visit: Visit, held: int | None) -> int | None:
-    """Index with the moment held: one more where dM/dgamma < 0; unknown where it vanishes."""
-    if held is None or visit.kind == "limit":
+def _moment_index(point: Point, supports: int | None) -> int | None:
+    """Index with the moment supports: one more where dM/dgamma < 0; unknown where it vanishes."""
+    if held is None or point.kind == "limit":
         return None
-    return held + (visit.at.slope < 0.0)
+    return held + (point.solution.slope < 0.0)
 
 
-def _points(piece: Sector, visits: list[Visit]) -> list[Point]:
+def _points(ring: GrippedRing, points: list[Point]) -> list[Point]:
     """The special points, with the index on their two sides."""
     points = []
-    for k, visit in enumerate(visits):
-        if not visit.kind:
+    for k, point in enumerate(points):
+        if not point.kind:
             continue
         before, after = (
-            full_index(piece, index) for index in visit.sides or (visit.index, visit.index)
+            total_index(ring, index) for index in point.sides or (point.index, point.index)
         )
-        at = visit.at
-        numbers = (at.state.load, piece.moment(at.moment), piece.copies * at.energy)
-        points.append(Point(visit.kind, *numbers, before, after, k, visit.details))
+        at = point.solution
+        numbers = (at.state.load, ring.moment(at.moment), ring.copies * at.energy)
+        points.append(Point(point.kind, *numbers, before, after, k, point.details))
     return points
 
 
-def _free_index(scene: Scene, piece: Sector, visit: Visit) -> int | None:
+def _free_index(scene: Scene, ring: GrippedRing, point: Point) -> int | None:
     """Index of the ring with its grips removed, rigid motions taken out, if it stays at rest."""
     whole = _piece(scene, scene.n_edges, "full")
-    held = free_ring(whole.body)
-    quat = piece.full_frames(visit.at.state)
-    stretch = piece.full_lengths(visit.at.state) / whole.body.length - 1.0
+    supports = free_ring(whole.rod)
+    quat = ring.full_frames(point.solution.state)
+    stretch = ring.full_lengths(point.solution.state) / whole.rod.length - 1.0
     state = State(quat, stretch, np.zeros(3), 0.0)
-    system = assemble(whole.body, held, quat, stretch, state.force, 0.0)
-    free = held.free.reshape(-1)
+    system = assemble(whole.rod, supports, quat, stretch, state.force, 0.0)
+    free = supports.free.reshape(-1)
     residual = system.grad.reshape(-1)[free]
     border = system.border.reshape(-1, 3)[free]
     force = -np.linalg.lstsq(border, residual, rcond=None)[0]
-    scale = float(np.abs(system.diag).max() * whole.body.cell.max())
+    scale = float(np.abs(system.diag).max() * whole.rod.cell.max())
     if float(np.abs(residual + border @ force).max()) > _BALANCED * scale:
         if not scene.stretching:
             return None
         # a grip holds the length of its edge, too: without it the ring settles a little
-        settled = equilibrium(whole.body, held, state.but(force=force), tolerance=scene.tolerance)
+        settled = equilibrium(whole.rod, supports, state.but(force=force), tolerance=scene.tolerance)
         if not settled.converged:
             return None
         state, force = settled.state, settled.state.force
-    return index(whole.body, held, all_modes(held), state.but(force=force))
+    return index(whole.rod, supports, all_modes(supports), state.but(force=force))
 
 
-def _shapes(scene: Scene, piece: Sector, visits: list[Visit], status: str) -> Shapes | None:
+def _shapes(scene: Scene, ring: GrippedRing, points: list[Point], status: str) -> Shapes | None:
     """The full ring at every state, if there is any, and what else was asked to be kept of it."""
-    if not visits:
+    if not points:
         return None
     from der.analysis.full_ring import shapes
 
     modes = scene.modes and status != "interrupted"  # who pressed Ctrl-C does not wait for them
     arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
-    return shapes(piece, visits, arc_length, history=scene.history, modes=modes)
+    return shapes(ring, points, arc_length, history=scene.history, modes=modes)
 
 
-def _numerics(scene: Scene, piece: Sector) -> dict[str, object]:
+def _numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:
     return {
         "n_edges": scene.n_edges,
-        "sector": piece.name,
+        "sector": ring.name,
         "curvature": scene.curvature,
         "stretch": scene.stretch,
         "a_over_t": scene.a_over_t,

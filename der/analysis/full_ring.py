@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from der.continuation.events import Visit
+from der.continuation.events import Point
 from der.kernels.linking import unfold_lengths
 from der.kernels.quaternions import Array, rotation
 from der.records.configurations import Fall, Shapes, Softest
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
 from der.rod.stability import softest_modes
 
@@ -26,7 +26,7 @@ _HALF_TURNS = np.array([[-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 
 
 def shapes(
-    piece: Sector, visits: Sequence[Visit], arc_length: Array, *, history: bool, modes: bool
+    ring: GrippedRing, points: Sequence[Point], arc_length: Array, *, history: bool, modes: bool
 ) -> Shapes:
     """Vertices and frames at every state, with how the ring falls and its softest modes if asked.
 
@@ -36,33 +36,33 @@ def shapes(
     history : whether landings hold the history of their relaxations.
     modes : whether to compute the softest mode of each symmetry class at every state.
     """
-    states = [visit.at.state for visit in visits]
-    x, frames = _whole(piece, states)
-    falls = _falls(piece, visits) if history else []
-    softest = _softest(piece, states) if modes else None
+    states = [point.solution.state for point in points]
+    x, frames = _whole(ring, states)
+    falls = _falls(ring, points) if history else []
+    softest = _softest(ring, states) if modes else None
     return Shapes(x, frames, tuple(falls), softest, arc_length)
 
 
-def _whole(piece: Sector, states: Sequence[State]) -> tuple[Array, Array]:
+def _whole(ring: GrippedRing, states: Sequence[State]) -> tuple[Array, Array]:
     """Vertices (n, N, 3) and frames (n, N, 3, 3) of the ring."""
-    pairs = [piece.shape(state) for state in states]
+    pairs = [ring.shape(state) for state in states]
     return np.array([x for x, _ in pairs]), np.array([frames for _, frames in pairs])
 
 
-def _falls(piece: Sector, visits: Sequence[Visit]) -> list[Fall]:
-    """How the ring falls in the snaps among the visits."""
+def _falls(ring: GrippedRing, points: Sequence[Point]) -> list[Fall]:
+    """How the ring falls in the snaps among the points."""
     from der.analysis.snap import Landing
 
     return [
-        _fall(piece, k - 1, visit)
-        for k, visit in enumerate(visits)
-        if isinstance(visit, Landing) and visit.history
+        _fall(ring, k - 1, point)
+        for k, point in enumerate(points)
+        if isinstance(point, Landing) and point.history
     ]
 
 
-def _fall(piece: Sector, after: int, landing: Landing) -> Fall:
+def _fall(ring: GrippedRing, after: int, landing: Landing) -> Fall:
     """The history of a landing in steps of about equal length: it begins and ends slowly."""
-    x, frames = _whole(piece, landing.history)
+    x, frames = _whole(ring, landing.history)
     steps = [float(np.linalg.norm(b - a, axis=1).max()) for a, b in pairwise(x)]
     way = np.append(0.0, np.cumsum(steps))
     chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], STEPS)))
@@ -71,25 +71,25 @@ def _fall(piece: Sector, after: int, landing: Landing) -> Fall:
     return Fall(after, gamma[chosen], energy[chosen], x[chosen], frames[chosen])
 
 
-def _softest(piece: Sector, states: Sequence[State]) -> Softest:
+def _softest(ring: GrippedRing, states: Sequence[State]) -> Softest:
     """The softest mode of each symmetry class, and the ring displaced by the softest of all.
 
     Of the two signs of a mode the one nearer to that of the state before is taken.
     """
-    eigenvalues = np.empty((len(states), len(piece.classes)))
+    eigenvalues = np.empty((len(states), len(ring.classes)))
     u: list[Array] = []
     for k, state in enumerate(states):
         found = {}
-        for c, (label, (_, modes)) in enumerate(piece.classes.items()):
-            eigenvalues[k, c : c + 1], (mode,) = softest_modes(piece.body, piece.held, modes, state)
+        for c, (label, (_, modes)) in enumerate(ring.classes.items()):
+            eigenvalues[k, c : c + 1], (mode,) = softest_modes(ring.rod, ring.supports, modes, state)
             found[label] = mode
         label = list(found)[int(np.argmin(eigenvalues[k]))]
-        moved = displacements(piece, state, label, found[label])
+        moved = displacements(ring, state, label, found[label])
         u.append(-moved if u and np.vdot(moved, u[-1]) < 0.0 else moved)
-    return Softest(tuple(piece.classes), eigenvalues, np.array(u))
+    return Softest(tuple(ring.classes), eigenvalues, np.array(u))
 
 
-def displacements(piece: Sector, state: State, label: str, mode: Array) -> Array:
+def displacements(ring: GrippedRing, state: State, label: str, mode: Array) -> Array:
     """Displacements (N, 3) of the ring's vertices in a mode (n, b) of the class ``label``.
 
     Notes
@@ -103,11 +103,11 @@ def displacements(piece: Sector, state: State, label: str, mode: Array) -> Array
     rate = np.cross((turn @ mode[:, :3, None])[..., 0], d3) * (1.0 + state.stretch[:, None])
     rate += mode[:, 3:].sum(axis=1, keepdims=True) * d3
     mapped = -np.array(_SIGNS.get(label, (1.0, 1.0)))[:, None] * _HALF_TURNS
-    if piece.copies == 4:
+    if ring.copies == 4:
         rate = np.concatenate([mapped[0] * rate[:0:-1], rate])
-    if piece.copies > 1:
+    if ring.copies > 1:
         rate = np.concatenate([rate, mapped[1] * rate[-2:0:-1]])
-    edges = unfold_lengths(piece.body.length, piece.copies)[:, None] * rate
+    edges = unfold_lengths(ring.rod.length, ring.copies)[:, None] * rate
     u: Array = np.cumsum(edges, axis=0)
     grips = (u - 0.5 * edges)[[0, len(u) // 2]]
     return u - grips.mean(axis=0)

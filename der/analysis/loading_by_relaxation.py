@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 from der.analysis.snap import Landing
 from der.analysis.trail import CLOSE, ahead, is_work, longer, rested, went_on
-from der.continuation.events import Visit, Wanted
+from der.continuation.events import Point, Wanted
 from der.continuation.interpolant import between
-from der.continuation.step import Stuck, Tally
+from der.continuation.step import ContinuationFailed, Statistics
 from der.rod import relaxation
 from der.rod.equilibrium import Direction, Equilibrium, moved
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed, relax
 from der.rod.rod import State
 
@@ -29,16 +29,16 @@ _NARROW = 0.01  # of the way between two states, a parabola through a limit of M
 
 
 def follow_relaxed(
-    piece: Sector,
+    ring: GrippedRing,
     wanted: Wanted,
-    tally: Tally,
+    statistics: Statistics,
     *,
     start: Equilibrium | None = None,
     unload: bool = False,
     rise: float = RISE,
     tolerance: float = 1e-9,
     every: int = 0,
-) -> Iterator[Visit]:
+) -> Iterator[Point]:
     """Hand out the minima at given gamma, each by dynamic relaxation: no Hessian anywhere.
 
     Gamma goes in steps of ``rise`` [rad] and through every load that is asked for. Limits of the
@@ -49,13 +49,13 @@ def follow_relaxed(
 
     Raises
     ------
-    Stuck
+    ContinuationFailed
         Where a state does not come to rest.
     """
-    walk = _Walk(piece, wanted, tally, rise, tolerance, every)
+    walk = _Walk(ring, wanted, statistics, rise, tolerance, every)
     last = start
     for one in _with_limits(walk, _relaxed_states(walk, start)):
-        last = one.at
+        last = one.solution
         yield one
     if unload:
         back = replace(walk, wanted=replace(wanted, load_max=0.0))
@@ -68,9 +68,9 @@ def follow_relaxed(
 class _Walk:
     """What the states of one march by relaxation share."""
 
-    piece: Sector
+    ring: GrippedRing
     wanted: Wanted
-    tally: Tally
+    statistics: Statistics
     rise: float
     tolerance: float
     every: int
@@ -80,17 +80,16 @@ class _Walk:
 
         Raises
         ------
-        Stuck
+        ContinuationFailed
             Where there is none.
         """
-        found = relax(
-            self.piece.body, self.piece.held, start, tolerance=self.tolerance, every=every
+        found = relax(self.ring, start, tolerance=self.tolerance, every=every
         )
-        self.tally.force_evaluations += found.evaluations
+        self.statistics.force_evaluations += found.evaluations
         if not found.rests:
             where = f"vertex {found.where} " if found.where >= 0 else ""
-            raise Stuck(
-                f"at gamma = {start.load:.8f} the ring {where}{relaxation.ADVICE[found.outcome]}"
+            raise ContinuationFailed(
+                f"at gamma = {start.load:.8f} the ring {where}{relaxation.found.advice}"
             )
         return found
 
@@ -99,7 +98,7 @@ class _Walk:
         last = self.wanted.load_max
         low, high = min(first, last), max(first, last)
         if high - low > self.wanted.most_steps * self.rise:
-            raise Stuck(f"the march would not end within {self.wanted.most_steps} steps")
+            raise ContinuationFailed(f"the march would not end within {self.wanted.most_steps} steps")
         grid = [k * self.rise for k in range(math.ceil(low / self.rise), int(high / self.rise) + 1)]
         asked = self.wanted.targets
         if asked is None:
@@ -114,12 +113,12 @@ class _Walk:
         return sorted({*grid, *asked} - {first}, reverse=last < first)
 
 
-def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Visit]:
+def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Point]:
     """Relaxed states at the loads of a march, with landings where the ring has snapped."""
-    piece = walk.piece
-    first = walk.relaxed(piece.start if start is None else start.state)
-    trail = [rested(piece, [], first)]
-    yield Visit(trail[-1])
+    ring = walk.ring
+    first = walk.relaxed(ring.start if start is None else start.state)
+    trail = [rested(ring, [], first)]
+    yield Point(trail[-1])
     largest = 0.0  # moment so far
     loads = walk.loads(first.state.load)[::-1]
     while loads:
@@ -128,52 +127,52 @@ def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Visit]:
             longest = _LONGER * (here - trail[-2].state.load)
             if abs(loads[-1] - here) > abs(longest):
                 loads.append(here + 0.5 * longest)
-        found = walk.relaxed(ahead(piece, trail, loads[-1]))
-        walk.tally.steps += 1
+        found = walk.relaxed(ahead(ring, trail, loads[-1]))
+        walk.statistics.steps += 1
         largest = max(largest, abs(found.moment))
-        if went_on(piece, trail, found) and is_work(trail, found, largest):
+        if went_on(ring, trail, found) and is_work(trail, found, largest):
             loads.pop()
-            at = rested(piece, trail, found)
-            trail = longer(piece, trail, found)
-            yield Visit(at)
+            at = rested(ring, trail, found)
+            trail = longer(ring, trail, found)
+            yield Point(at)
         elif abs(loads[-1] - here) > RESOLUTION:
             loads.append(0.5 * (here + loads[-1]))
         else:
             landing = _landed(walk, trail, loads.pop())
-            trail = [landing.at]
+            trail = [landing.solution]
             yield landing
 
 
 def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
     """The state that a ring has snapped to between the last state of a trail and ``load``."""
-    piece, before = walk.piece, trail[-1]
-    found = walk.relaxed(ahead(piece, trail, load), walk.every)
+    ring, before = walk.ring, trail[-1]
+    found = walk.relaxed(ahead(ring, trail, load), walk.every)
     rise = load - before.state.load
-    energy = piece.copies * (before.energy + before.moment * rise)
+    energy = ring.copies * (before.energy + before.moment * rise)
     details: dict[str, object] = {
         "gamma_fold": load,
         "gamma_uncertainty": abs(rise),
         "energy_before": energy,
-        "energy_after": piece.copies * found.energy,
-        "energy_released": energy - piece.copies * found.energy,
-        "moment_before": piece.moment(before.moment),
-        "moment_after": piece.moment(found.moment),
+        "energy_after": ring.copies * found.energy,
+        "energy_released": energy - ring.copies * found.energy,
+        "moment_before": ring.moment(before.moment),
+        "moment_after": ring.moment(found.moment),
         "force_evaluations": found.evaluations,
     }
-    energies = tuple(piece.copies * float(e) for e in found.energies)
-    at = rested(piece, [], found)
+    energies = tuple(ring.copies * float(e) for e in found.energies)
+    at = rested(ring, [], found)
     return Landing(at, "snap", details=details, history=found.history, energies=energies)
 
 
-def _with_limits(walk: _Walk, states: Iterator[Visit]) -> Iterator[Visit]:
-    """The visits with the limits of the moment put in, each state a step late."""
-    window: list[list[Visit]] = []  # each with those that are all but the same state
+def _with_limits(walk: _Walk, states: Iterator[Point]) -> Iterator[Point]:
+    """The points with the limits of the moment put in, each state a step late."""
+    window: list[list[Point]] = []  # each with those that are all but the same state
     for one in states:
         if one.kind == "snap":
             for same in window[1:]:
                 yield from same
             window = []
-        if window and abs(one.at.state.load - window[-1][0].at.state.load) <= CLOSE:
+        if window and abs(one.solution.parameter - window[-1][0].solution.parameter) <= CLOSE:
             window[-1].append(one)
         else:
             window.append([one])
@@ -181,17 +180,17 @@ def _with_limits(walk: _Walk, states: Iterator[Visit]) -> Iterator[Visit]:
             yield one
         if len(window) < 3 or len(window[-1]) > 1:
             continue
-        a, b, c = (same[0].at for same in window)
+        a, b, c = (same[0].solution for same in window)
         turn = list(window[1])
         if (b.moment - a.moment) * (c.moment - b.moment) < 0.0:
             turn.append(_turning(walk, a, b, c))
-        yield from sorted(turn, key=lambda v: v.at.state.load, reverse=c.state.load < b.state.load)
+        yield from sorted(turn, key=lambda v: v.solution.parameter, reverse=c.state.load < b.state.load)
         window.pop(0)
     for same in window[1:]:
         yield from same
 
 
-def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Visit:
+def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Point:
     """The limit of the moment among three relaxed states: bracketed (Brent), then by a parabola.
 
     All of their states lie between the three: a little beyond, there may be a snap. Towards a fold
@@ -209,7 +208,7 @@ def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Vis
     found = minimize_scalar(moment, bounds=(low, high), method="bounded", options={"xatol": h})
     load = min(max(float(found.x), low + h), high - h)
     load = _vertex([_between(walk, a, c, x) for x in (load - h, load, load + h)])
-    return Visit(_between(walk, a, c, min(max(load, low), high)), "limit")
+    return Point(_between(walk, a, c, min(max(load, low), high)), "limit")
 
 
 def _vertex(trail: list[Equilibrium]) -> float:
@@ -223,7 +222,7 @@ def _vertex(trail: list[Equilibrium]) -> float:
 def _between(walk: _Walk, a: Equilibrium, c: Equilibrium, load: float) -> Equilibrium:
     """The relaxed state at a load between those of two others."""
     part = (load - a.state.load) / (c.state.load - a.state.load)
-    step = between(walk.piece.held, a.state, c.state)
+    step = walk.ring.difference(a.state, c.state)
     guess = Direction(part * step.q, 0.0 * step.force, load - a.state.load)
-    found = walk.relaxed(moved(walk.piece.held, a.state, guess).but(load=load))
-    return rested(walk.piece, [a], found)
+    found = walk.relaxed(walk.ring.retract(a.state, guess).but(load=load))
+    return rested(walk.ring, [a], found)

@@ -23,10 +23,10 @@ from typing import NamedTuple
 import numpy as np
 
 from der.analysis.mesh_transfer import Restricted, restricted
-from der.continuation.events import Visit
+from der.continuation.events import Point
 from der.kernels.quaternions import Array
 from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 
 LEVELS = 3
 GAMMA, MOMENT, ENERGY = 0, 1, 2  # columns of a table of values
@@ -52,29 +52,29 @@ class Matched(NamedTuple):
 class Family:
     """The curves of equilibria on three meshes, matched along the finest."""
 
-    pieces: tuple[Sector, ...]
+    rings: tuple[GrippedRing, ...]
     tolerance: float
 
     def values(self, level: int, at: Equilibrium) -> tuple[float, float, float]:
         """Return gamma [rad], M of one arm [GJ/a] and U of the full ring [GJ/a]."""
-        piece = self.pieces[level]
-        return at.state.load, piece.moment(at.moment), piece.copies * at.energy
+        ring = self.rings[level]
+        return at.state.load, ring.moment(at.moment), ring.copies * at.energy
 
     def matched(self, fine: Equilibrium, near: Restricted | None = None) -> Matched | None:
         """The states matched to one on the finest mesh; None where a level has none.
 
         ``near`` : those of a state nearby, to start from.
         """
-        found = restricted(self.pieces, fine, near, self.tolerance)
+        found = restricted(self.rings, fine, near, self.tolerance)
         if found is None:
             return None
         table = np.array(
             [
                 self._line(0, fine, 1.0, 0.0),
-                *(self._line(k, x.at, x.speed, x.beyond) for k, x in enumerate(found, start=1)),
+                *(self._line(k, x.solution, x.speed, x.beyond) for k, x in enumerate(found, start=1)),
             ]
         )
-        residual = max(fine.residual, found.half.at.residual, found.quarter.at.residual)
+        residual = max(fine.residual, found.half.solution.residual, found.quarter.solution.residual)
         return Matched(table, residual, found)
 
     def _line(self, level: int, at: Equilibrium, speed: float, beyond: float) -> list[float]:
@@ -83,8 +83,8 @@ class Family:
         The values are those ``beyond`` before the state, where its plane is.
         """
         values = self.values(level, at)
-        gamma_rate = speed * at.tangent.load
-        moment_rate = speed * self.pieces[level].moment(at.moment_rate)
+        gamma_rate = speed * at.parameter_rate
+        moment_rate = speed * self.rings[level].moment(at.moment_rate)
         rates = (gamma_rate, moment_rate, 4.0 * values[MOMENT] * gamma_rate)
         return [v - beyond * r for v, r in zip(values, rates, strict=True)] + list(rates)
 
@@ -98,13 +98,10 @@ class Family:
 
     def beside(self, base: Equilibrium, s: float) -> Equilibrium | None:
         """The state on the finest mesh at the distance ``s`` from another; None without one."""
-        piece, t = self.pieces[0], base.tangent
-        at = equilibrium(
-            piece.body,
-            piece.held,
-            moved(piece.held, base.state, Direction(s * t.q, s * t.force, s * t.load)),
+        ring, t = self.rings[0], base.tangent
+        at = ring.correct(ring.retract(base.state, Direction(s * t.q, s * t.force, s * t.load)),
             along=t,
-            control=Control.DIRECTION,
+            hold=PLANE,
             tolerance=self.tolerance,
         )
         return at if at.converged else None
@@ -131,7 +128,7 @@ class Place:
     c(s), the root is off by ds = -c_F/F', and the values there by c + rates ds.
     """
 
-    s: float  # distance from the visit along the path
+    s: float  # distance from the point along the path
     table: Array  # (LEVELS, 6)
     residual: float
     values: Array  # (3,) gamma, M, U
@@ -149,38 +146,38 @@ class Goal(NamedTuple):
     direction: float  # where gamma is sought: sign of dgamma/ds on this side of a fold
 
 
-def _goal(visit: Visit, asked: Collection[float]) -> Goal | None:
+def _goal(point: Point, asked: Collection[float]) -> Goal | None:
     """What a visited state stands for; None: for nothing but a place on the curve."""
-    load = visit.at.state.load
-    if visit.sought is not None:
-        return Goal(GAMMA, *visit.sought)
-    if visit.kind == "fold":
+    load = point.solution.parameter
+    if point.sought is not None:
+        return Goal(GAMMA, *point.sought)
+    if point.kind == "fold":
         return Goal(RATE + GAMMA, 0.0, 0.0)
-    if visit.kind == "limit":
+    if point.kind == "limit":
         return Goal(RATE + MOMENT, 0.0, 0.0)
-    if visit.kind == "" and load in asked:
-        return Goal(GAMMA, load, visit.at.tangent.load)
+    if point.kind == "" and load in asked:
+        return Goal(GAMMA, load, point.solution.parameter_rate)
     return None
 
 
 def placed(
-    family: Family, visits: Sequence[Visit], asked: Collection[float]
+    family: Family, points: Sequence[Point], asked: Collection[float]
 ) -> Iterator[Place | None]:
     """Where visited states belong on the extrapolated curve; None where a level has no state."""
     near = None
-    for visit in visits:
-        here = family.matched(visit.at, near)
-        yield None if here is None else _placed(family, visit, here, asked)
+    for point in points:
+        here = family.matched(point.solution, near)
+        yield None if here is None else _placed(family, point, here, asked)
         near = None if here is None else here.coarse
 
 
-def _placed(family: Family, visit: Visit, here: Matched, asked: Collection[float]) -> Place | None:
+def _placed(family: Family, point: Point, here: Matched, asked: Collection[float]) -> Place | None:
     """Where a visited state belongs, ``here`` being matched to it."""
-    goal = _goal(visit, asked)
+    goal = _goal(point, asked)
     if goal is not None:
-        return _sought(family, visit.at, here, goal)
+        return _sought(family, point.solution, here, goal)
     values, bend = romberg(here.table)[-1][:RATE], np.zeros((LEVELS, RATE))
-    marked = visit.kind != ""
+    marked = point.kind != ""
     return Place(0.0, here.table, here.residual, values, np.eye(RATE, 6), bend, marked, not marked)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from der.continuation.interpolant import between
 from der.kernels.quaternions import Array
 from der.rod.equilibrium import Control, Direction, Equilibrium, dot, equilibrium, moved
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
 
 
@@ -38,7 +38,7 @@ class Restricted(NamedTuple):
 
 
 def restricted(
-    pieces: Sequence[Sector],
+    rings: Sequence[GrippedRing],
     fine: Equilibrium,
     near: Restricted | None,
     tolerance: float,
@@ -47,7 +47,7 @@ def restricted(
 
     Parameters
     ----------
-    pieces : the sector on N, N/2 and N/4 edges.
+    rings : the sector on N, N/2 and N/4 edges.
     near : the same of a state nearby; None: not known.
     tolerance : of the residual of an equilibrium, GJ/a.
 
@@ -56,9 +56,9 @@ def restricted(
     Restricted or None
         None where a level has no such state.
     """
-    finest, on_half, on_quarter = pieces
-    q, load = fine.tangent.q, fine.tangent.load
-    advance = dot(finest.body, _normal(finest, q, load), fine.tangent)
+    finest, on_half, on_quarter = rings
+    q, load = fine.tangent.q, fine.parameter_rate
+    advance = dot(finest.rod, _normal(finest, q, load), fine.tangent)
     q = np.ascontiguousarray(q[::2])
     given = None if near is None else near.half.offset
     half = _level(on_half, fine.state, q, load, lambda: given, advance, 0.0, tolerance)
@@ -66,23 +66,23 @@ def restricted(
         return None
     expected = partial(_twice_as_coarse, on_quarter, half.offset, near)
     q = np.ascontiguousarray(q[::2])
-    quarter = _level(on_quarter, half.at.state, q, load, expected, advance, half.beyond, tolerance)
+    quarter = _level(on_quarter, half.solution.state, q, load, expected, advance, half.beyond, tolerance)
     return None if quarter is None else Restricted(half, quarter)
 
 
-def _twice_as_coarse(piece: Sector, finer: Direction, near: Restricted | None) -> Direction:
-    """The offset expected on the coarsest mesh, ``piece``, where ``finer`` is that before it."""
+def _twice_as_coarse(ring: GrippedRing, finer: Direction, near: Restricted | None) -> Direction:
+    """The offset expected on the coarsest mesh, ``ring``, where ``finer`` is that before it."""
     # second order: four times that of the finer mesh; and what that was short of nearby
     offset = _coarser(finer, 4.0)
     if near is not None:
         less = _coarser(near.half.offset, 4.0)
         offset = _sum(_sum(offset, near.quarter.offset, 1.0), less, -1.0)
-    offset.q[~piece.held.free] = 0.0
+    offset.q[~ring.supports.free] = 0.0
     return offset
 
 
 def _level(
-    piece: Sector,
+    ring: GrippedRing,
     finer: State,
     q: Array,
     load: float,
@@ -91,7 +91,7 @@ def _level(
     beyond: float,
     tolerance: float,
 ) -> Level | None:
-    """The state of ``piece`` in the plane normal to rates ``q`` (n, b) and ``load``.
+    """The state of ``ring`` in the plane normal to rates ``q`` (n, b) and ``load``.
 
     Tried from bare frames, then from the offset ``expected``, which may lead beside the plane and
     is not worked out before it is needed. ``beyond`` is that of the finer mesh.
@@ -102,29 +102,26 @@ def _level(
         finer.force,
         finer.load,
     )
-    row = _normal(piece, q, load)
-    for start in _starts(piece, own, row, load, expected):
-        at = equilibrium(
-            piece.body,
-            piece.held,
-            start,
+    row = _normal(ring, q, load)
+    for start in _starts(ring, own, row, load, expected):
+        at = ring.correct(start,
             along=row,
-            control=Control.DIRECTION,
+            hold=PLANE,
             tolerance=tolerance,
         )
-        if at.converged and (speed := dot(piece.body, row, at.tangent)) != 0.0:
+        if at.converged and (speed := ring.inner(row, at.tangent)) != 0.0:
             break
     else:
         return None
-    offset = between(piece.held, own, at.state)
+    offset = ring.difference(own, at.state)
     # corrections are orthogonal one by one, and rotations do not commute: a state lies beside the
     # plane to the second order of its offset, by as much as its start would have it
-    beyond += dot(piece.body, row, offset) / advance
+    beyond += ring.inner(row, offset) / advance
     return Level(at, offset, advance / speed, beyond)
 
 
 def _starts(
-    piece: Sector, own: State, row: Direction, load: float, expected: Callable[[], Direction | None]
+    ring: GrippedRing, own: State, row: Direction, load: float, expected: Callable[[], Direction | None]
 ) -> Iterator[State]:
     """Where Newton's method starts: bare frames, then these moved by the offset ``expected``."""
     yield own
@@ -132,11 +129,11 @@ def _starts(
     if offset is not None:
         rates = row._replace(load=load)
         # offsets of another state may lie beside this plane by a little
-        away = dot(piece.body, row, offset) / dot(piece.body, row, rates)
-        yield moved(piece.held, own, _sum(offset, rates, -away))
+        away = ring.inner(row, offset) / ring.inner(row, rates)
+        yield ring.retract(own, _sum(offset, rates, -away))
 
 
-def _normal(piece: Sector, q: Array, load: float) -> Direction:
+def _normal(ring: GrippedRing, q: Array, load: float) -> Direction:
     """The direction of rates ``q`` (n, b) of the frames and ``load`` of gamma, as a normal.
 
     Notes
@@ -145,7 +142,7 @@ def _normal(piece: Sector, q: Array, load: float) -> Direction:
     both rotations, the grips' included: they turn with gamma and are no entries of q. Without them
     an end of the integral would be missing, and the series in h would have odd powers.
     """
-    return Direction(q, np.zeros(len(piece.held.target)), piece.turning * load)
+    return Direction(q, np.zeros(len(ring.supports.target)), ring.turning * load)
 
 
 def _coarser(offset: Direction, factor: float) -> Direction:

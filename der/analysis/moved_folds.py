@@ -18,58 +18,58 @@ from itertools import pairwise
 import numpy as np
 
 from der.analysis.matching import FARTHEST, GAMMA, Family, Place, placed, romberg
-from der.continuation.events import Visit, Wanted, visit
+from der.continuation.events import Point, Wanted, point
 from der.continuation.interpolant import between
 from der.kernels.quaternions import Array
 from der.rod.equilibrium import dot
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 
 
-def arc_lengths(piece: Sector, visits: Sequence[Visit]) -> Array:
-    """Distances (n,) of the visits from the first, along chords, in the norm of the path."""
-    steps = [0.0] * bool(visits)
-    for a, b in pairwise(one.at.state for one in visits):
-        jump = between(piece.held, a, b)
-        steps.append(math.sqrt(dot(piece.body, jump, jump)))
+def arc_lengths(ring: GrippedRing, points: Sequence[Point]) -> Array:
+    """Distances (n,) of the points from the first, along chords, in the norm of the path."""
+    steps = [0.0] * bool(points)
+    for a, b in pairwise(one.solution.state for one in points):
+        jump = ring.difference(a, b)
+        steps.append(math.sqrt(ring.inner(jump, jump)))
     return np.cumsum(steps)
 
 
 def all_asked(
-    family: Family, wanted: Wanted, visits: Sequence[Visit], asked: Collection[float]
-) -> list[Visit]:
-    """The visits with those put in, and taken out, that moving folds pass over, in path order.
+    family: Family, wanted: Wanted, points: Sequence[Point], asked: Collection[float]
+) -> list[Point]:
+    """The points with those put in, and taken out, that moving folds pass over, in path order.
 
     Parameters
     ----------
-    visits : the path on the finest mesh, from `path.follow`.
+    points : the path on the finest mesh, from `path.follow`.
     asked : values of gamma that states were solved for [rad]. Those at which a path ends, or is
         judged (pi), are left as they are.
     """
     asked = [load for load in asked if abs(load) not in (math.pi, wanted.load_max)]
-    lengths = arc_lengths(family.pieces[0], visits).tolist()
-    line = dict(enumerate(zip(lengths, visits, strict=True)))
-    folds = [k for k, one in enumerate(visits) if one.kind == "fold"]
-    for before, k, after in zip([-1, *folds], folds, [*folds[1:], len(visits)], strict=False):
-        (place,) = placed(family, [visits[k]], asked)
+    lengths = arc_lengths(family.rings[0], points).tolist()
+    line = dict(enumerate(zip(lengths, points, strict=True)))
+    folds = [k for k, one in enumerate(points) if one.kind == "fold"]
+    for before, k, after in zip([-1, *folds], folds, [*folds[1:], len(points)], strict=False):
+        (place,) = placed(family, [points[k]], asked)
         if place is None:
             continue
         bend = float(romberg(place.bend[:, GAMMA])[-1])
-        old, new = visits[k].at.state.load, float(place.values[GAMMA])
+        old, new = points[k].solution.parameter, float(place.values[GAMMA])
         passed = [load for load in asked if min(old, new) < load < max(old, new)]
         if (new - old) * bend < 0.0:
             for load in passed:
-                for s, one in _reached(family, wanted, visits[k], place, bend, load):
+                for s, one in _reached(family, wanted, points[k], place, bend, load):
                     line[len(line)] = (lengths[k] + s, one)
             continue
         for j in range(before + 1, after):
-            if visits[j].kind == "" and visits[j].at.state.load in passed:
+            if points[j].kind == "" and points[j].solution.parameter in passed:
                 del line[j]
     return [one for _, one in sorted(line.values(), key=lambda entry: entry[0])]
 
 
 def _reached(
-    family: Family, wanted: Wanted, fold: Visit, place: Place, bend: float, load: float
-) -> Iterator[tuple[float, Visit]]:
+    family: Family, wanted: Wanted, fold: Point, place: Place, bend: float, load: float
+) -> Iterator[tuple[float, Point]]:
     """Distances from a fold, and states on N edges, of the two that are at ``load`` once it moves.
 
     ``bend`` is d2gamma/ds2 of the extrapolated curve there; a state is left out where a mesh has
@@ -78,9 +78,9 @@ def _reached(
     away = math.sqrt(2.0 * (load - float(place.values[GAMMA])) / bend)
     for side in (-1.0, 1.0):
         s = place.s + side * away
-        at = family.beside(fold.at, s) if abs(s) < FARTHEST else None
+        at = family.beside(fold.solution, s) if abs(s) < FARTHEST else None
         if at is not None:
-            found = visit(family.pieces[0], wanted, at, sought=(load, side * bend))
+            found = visit(family.rings[0], wanted, at, sought=(load, side * bend))
             (there,) = placed(family, [found], ())
             if there is not None:
                 yield s, found

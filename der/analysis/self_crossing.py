@@ -1,123 +1,139 @@
-"""Where a strand passes through another: a root of the gap between them, signed.
+"""Self-crossing: an event of a ring's path, where one strand of the ideal curve passes another.
 
-The link is an integer and can only be bisected, at O(N^2) a time. The gap between two strands, the
-distance of their closest edges with the sign of the edges' triple product, passes through zero
-smoothly. On the curve that approximates a step it takes neither Newton's method nor the link; both
-are asked afterwards, on the two sides of the place.
+The linking number tells that a strand has passed within a step: it is an integer, and changes. The
+signed gap between the two strands tells where: it is followed to its zero on the step's
+interpolant, corrected to an equilibrium once, and the link is counted on both sides. Where the gap
+does not show the crossing, the link is bisected.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TypeAlias
 
+from der.continuation.events import Events, Mark, regular
+from der.continuation.extrema import of_parameter
 from der.continuation.roots import find_root
-from der.continuation.step import Step
+from der.continuation.step import SAME, Step
+from der.kernels.strands import gap, nearest_strands
+from der.problem import Solution
+from der.rod.gripped_ring import GrippedRing
+from der.rod.rod import State
 
-_TURN = 3.0  # rad; an arc has to turn by pi to meet itself (Fenchel)
+_CONTACT = 1e-5  # of s, for a crossing: places are found to 2e-6
+_SIDE = 0.45  # of that: how far before and behind a crossing the link is counted
+_BRIEF = 1e-3  # of s, between a crossing and its reversal
 _PLACE = 1e-3  # of s: how well the root is found before the curve is corrected there
 _ROUNDS = 2  # of the chord after that
 
+Place: TypeAlias = tuple[float, int]  # s, and the link there
 
-@njit(cache=True)
-def nearest_strands(x, y):
-    """Vertices (i, k) of two strands that come nearest on the straight way from ``x`` to ``y``.
 
-    Parameters
-    ----------
-    x, y : (n, 3) vertices of two closed polygons.
+@dataclass
+class SelfCrossing:
+    """Points of kind "contact" where the linking number of a ring changes.
 
-    Returns
-    -------
-    (i, k), or (-1, -1) where no two parts are strands: the curve turns too little between them.
+    It remembers the link of the last two ends of steps, which are starts of the next.
     """
-    n = x.shape[0]
-    turned = np.zeros(n)  # from vertex 0 on; a vertex turns half before itself, half behind
-    total = 0.0
-    for j in range(n):
-        one, two, dot = 0.0, 0.0, 0.0
-        for c in range(3):
-            a = x[j, c] - x[j - 1 if j > 0 else n - 1, c]
-            b = x[j + 1 if j + 1 < n else 0, c] - x[j, c]
-            one, two, dot = one + a * a, two + b * b, dot + a * b
-        here = np.arccos(max(-1.0, min(1.0, dot / np.sqrt(one * two))))
-        total += here
-        turned[j] = total - 0.5 * here
-    least, at_i, at_k = np.inf, -1, -1
-    for i in range(n):
-        for k in range(i + 2, n):
-            arc = turned[k] - turned[i]
-            if arc < _TURN or total - arc < _TURN:
-                continue
-            dx, dy, dz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-            ux, uy, uz = y[k, 0] - y[i, 0] - dx, y[k, 1] - y[i, 1] - dy, y[k, 2] - y[i, 2] - dz
-            way = ux * ux + uy * uy + uz * uz
-            t = -(dx * ux + dy * uy + dz * uz) / way if way > 0.0 else 0.0
-            t = max(0.0, min(1.0, t))
-            size = (dx + t * ux) ** 2 + (dy + t * uy) ** 2 + (dz + t * uz) ** 2
-            if size < least:
-                least, at_i, at_k = size, i, k
-    return at_i, at_k
+
+    ring: GrippedRing
+    stability: bool  # whether the index is wanted there
+    _known: list[tuple[Solution[State], int]] = field(default_factory=list)
+
+    def located(self, step: Step[State], line: list[Mark], *, ended: bool) -> list[Mark]:
+        """Return the marks of a step with crossings put in where the link changes."""
+        start, end = step.start, line[-1].point.solution
+        if ended and self.ring.overlaps(end.state):
+            return line
+        # a ring that starts planar and covering itself has no link to start from
+        if self._remembered(start) is None and self.ring.overlaps(start.state):
+            return line
+        low, high = (line[0].s, self._link(start)), (line[-1].s, self._link(end))
+        crossings = [_on_its_side(step, line, m) for m in _lasting(self._between(step, low, high))]
+        return sorted([*line, *crossings], key=lambda m: m.s)
+
+    def _remembered(self, solution: Solution[State]) -> int | None:
+        return next((link for known, link in self._known if known is solution), None)
+
+    def _link(self, solution: Solution[State]) -> int:
+        link = self._remembered(solution)
+        if link is None:
+            link = self.ring.link(solution.state)
+            self._known = [*self._known[-1:], (solution, link)]
+        return link
+
+    def _between(
+        self, step: Step[State], low: Place, high: Place, *, halve: bool = False
+    ) -> list[Mark]:
+        """Where the link changes between two places: at roots of the gap, else by bisection."""
+        if low[1] == high[1]:
+            return []
+        if high[0] - low[0] < _CONTACT:
+            details = {"linking_before": low[1], "linking_after": high[1]}
+            events: Events[State] = Events(stability=self.stability)
+            at = step.at(low[0])
+            return [Mark(low[0], regular(self.ring, events, at, kind="contact", details=details))]
+        passed = None if halve else crossing(self.ring, step, low[0], high[0])
+        if passed is None:
+            s = 0.5 * (low[0] + high[0])
+            inside = [(s, self.ring.link(step.near(s)))]
+        else:
+            sides = passed - _SIDE * _CONTACT, passed + _SIDE * _CONTACT
+            inside = [
+                (s, self.ring.link(step.at(s).state)) for s in sides if low[0] < s < high[0]
+            ]
+        # what changes beside a crossing that was looked at is bisected: it was none, or not the
+        # only one
+        return [
+            one
+            for ends in pairwise([low, *inside, high])
+            for one in self._between(step, *ends, halve=passed is not None)
+        ]
 
 
-@njit(cache=True, inline="always")
-def _edges_apart(x, i, k):
-    """Squared distance of edges ``i`` and ``k``, and their triple product (Ericson 2005, 5.1.9)."""
-    n = x.shape[0]
-    p, q = (i - 1 if i > 0 else n - 1), (k - 1 if k > 0 else n - 1)
-    ax, ay, az = x[i, 0] - x[p, 0], x[i, 1] - x[p, 1], x[i, 2] - x[p, 2]
-    bx, by, bz = x[k, 0] - x[q, 0], x[k, 1] - x[q, 1], x[k, 2] - x[q, 2]
-    rx, ry, rz = x[p, 0] - x[q, 0], x[p, 1] - x[q, 1], x[p, 2] - x[q, 2]
-    aa, bb, ab = (
-        ax * ax + ay * ay + az * az,
-        bx * bx + by * by + bz * bz,
-        ax * bx + ay * by + az * bz,
-    )
-    ar, br = ax * rx + ay * ry + az * rz, bx * rx + by * ry + bz * rz
-    cross = aa * bb - ab * ab
-    s = max(0.0, min(1.0, (ab * br - ar * bb) / cross)) if cross > 0.0 else 0.0
-    t = (ab * s + br) / bb
-    if t < 0.0:
-        t, s = 0.0, max(0.0, min(1.0, -ar / aa))
-    elif t > 1.0:
-        t, s = 1.0, max(0.0, min(1.0, (ab - ar) / aa))
-    square = (rx + s * ax - t * bx) ** 2 + (ry + s * ay - t * by) ** 2 + (rz + s * az - t * bz) ** 2
-    triple = rx * (ay * bz - az * by) + ry * (az * bx - ax * bz) + rz * (ax * by - ay * bx)
-    return square, triple
+def _on_its_side(step: Step[State], line: list[Mark], crossing: Mark) -> Mark:
+    """A crossing, put on the other side of a solution at a target where its parameter says so.
 
-
-@njit(cache=True)
-def gap(x, i, k):
-    """Signed distance of two strands of the polygon ``x`` (n, 3) near its edges ``i`` and ``k``.
-
-    It is that of the closest edges, found downhill from there.
+    The place of a solution at a given parameter is known to second order only.
     """
-    n = x.shape[0]
-    square, triple, downhill = np.inf, 0.0, True
-    while downhill:
-        downhill = False
-        first, second = i, k
-        for a in range(-1, 2):
-            for b in range(-1, 2):
-                one, two = (first + a) % n, (second + b) % n
-                if 1 < (two - one) % n < n - 1:  # neighbours touch
-                    there, sign = _edges_apart(x, one, two)
-                    if there < square:
-                        square, triple, i, k, downhill = there, sign, one, two, True
-    return np.copysign(np.sqrt(square), triple)
+    value, rate = of_parameter(crossing.point.solution)
+    for m in line[1:-1]:  # the ends of the step stay its ends
+        if not m.point.kind and abs(m.s - crossing.s) < SAME * step.length:
+            ahead = (value - m.point.solution.parameter) * rate
+            if ahead * (crossing.s - m.s) < 0.0:
+                crossing = crossing._replace(s=math.nextafter(m.s, math.copysign(math.inf, ahead)))
+    return crossing
 
 
-def passage(step: Step, low: float, high: float) -> float | None:
-    """A place between two of a ``step`` at which a strand passes; None where it is not seen.
+def _lasting(crossings: list[Mark]) -> list[Mark]:
+    """Crossings without those that undo the one before within a very short piece of the path.
 
-    The curve is corrected to an equilibrium once, close to the passage.
+    Close to the folded state the strands lie within the mesh's sagitta of each other: such pairs
+    come and go with N.
+    """
+    kept: list[Mark] = []
+    for m in crossings:
+        back = m.point.details["linking_after"]
+        if kept and m.s - kept[-1].s < _BRIEF and kept[-1].point.details["linking_before"] == back:
+            kept.pop()
+        else:
+            kept.append(m)
+    return kept
+
+
+def crossing(ring: GrippedRing, step: Step[State], low: float, high: float) -> float | None:
+    """Return a place between two of a step at which a strand passes; None where it is not seen.
+
+    The interpolant is corrected to an equilibrium once, close to the crossing.
 
     Raises
     ------
-    Stuck
+    ContinuationFailed
         Where Newton's method fails there.
     """
-    shapes = [step.piece.vertices(step.expected(s)) for s in (low, high)]
+    shapes = [ring.vertices(step.expected(s)) for s in (low, high)]
     i, k = nearest_strands(*shapes)
     if i < 0:
         return None
@@ -127,7 +143,7 @@ def passage(step: Step, low: float, high: float) -> float | None:
 
     def apart(s: float) -> float:
         if s not in known:
-            known[s] = float(gap(step.piece.vertices(step.expected(s)), i, k))
+            known[s] = float(gap(ring.vertices(step.expected(s)), i, k))
         return known[s]
 
     s = find_root(apart, low, high, _PLACE)

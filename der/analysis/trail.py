@@ -11,7 +11,7 @@ import math
 from der.analysis.snap import heading
 from der.continuation.interpolant import between
 from der.rod.equilibrium import Direction, Equilibrium, Outcome, dot, moved
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed
 from der.rod.rod import State
 
@@ -23,11 +23,11 @@ _SHORTER = 0.1  # of the last step: a state so near the last one takes its place
 _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 
 
-def ahead(piece: Sector, trail: list[Equilibrium], load: float) -> State:
+def ahead(ring: GrippedRing, trail: list[Equilibrium], load: float) -> State:
     """State at ``load`` extrapolated from the last three, or as many as there are."""
     here = trail[-1]
     rise = load - here.state.load
-    rate = heading(piece, 1.0)
+    rate = ring.heading(1.0)
     if len(trail) > 1:
         rate = _per_load(here)
     if len(trail) > 2:
@@ -36,20 +36,20 @@ def ahead(piece: Sector, trail: list[Equilibrium], load: float) -> State:
         span = 0.5 * (here.state.load - trail[-3].state.load)
         lead = 0.5 * (load - trail[-2].state.load) / span
         rate = rate._replace(q=rate.q + lead * (rate.q - older.q))
-    return moved(piece.held, here.state, Direction(rise * rate.q, 0.0 * rate.force, rise)).but(
+    return ring.retract(here.state, Direction(rise * rate.q, 0.0 * rate.force, rise)).but(
         load=load
     )
 
 
 def _per_load(at: Equilibrium) -> Direction:
     """Mean rate of change over the last step, per unit of load."""
-    return Direction(at.tangent.q / at.tangent.load, 0.0 * at.tangent.force, 1.0)
+    return Direction(at.tangent.q / at.parameter_rate, 0.0 * at.tangent.force, 1.0)
 
 
-def went_on(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> bool:
+def went_on(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> bool:
     """Whether a state lies where the last ones lead, and not where the ring has snapped to."""
-    miss = between(piece.held, ahead(piece, trail, found.state.load), found.state)
-    return math.sqrt(dot(piece.body, miss, miss)) < _MISS
+    miss = ring.difference(ahead(ring, trail, found.state.load), found.state)
+    return math.sqrt(ring.inner(miss, miss)) < _MISS
 
 
 def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
@@ -73,13 +73,13 @@ def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
     return lost <= max(_LOST * largest * abs(rise), _FAINT * max(abs(found.energy), 1.0))
 
 
-def rested(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> Equilibrium:
+def rested(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> Equilibrium:
     """A relaxed state as an equilibrium: its rates are differences along the trail behind it."""
-    tangent, slope = heading(piece, 1.0), 0.0
+    tangent, slope = ring.heading(1.0), 0.0
     if trail:
         last = trail[-1]
-        step = between(piece.held, last.state, found.state)
-        norm = math.sqrt(dot(piece.body, step, step))
+        step = ring.difference(last.state, found.state)
+        norm = math.sqrt(ring.inner(step, step))
         tangent, slope = last.tangent, last.slope  # where the two are one state
         apart = abs(step.load) > CLOSE
         if apart:
@@ -91,7 +91,7 @@ def rested(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> Equilibri
             slope += step.load * (slope - older) / (found.state.load - before.state.load)
     return Equilibrium(
         found.state,
-        Outcome.CONVERGED,
+        Reason.CONVERGED,
         -1,
         0,
         found.residual,
@@ -104,7 +104,7 @@ def rested(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> Equilibri
     )
 
 
-def longer(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> list[Equilibrium]:
+def longer(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> list[Equilibrium]:
     """The last states of a trail with a new one, which takes the place of one all but beside it.
 
     What the next step is extrapolated from would otherwise be differences of next to nothing.
@@ -114,4 +114,4 @@ def longer(piece: Sector, trail: list[Equilibrium], found: Relaxed) -> list[Equi
         return trail
     if len(trail) > 1 and step < _SHORTER * abs(trail[-1].state.load - trail[-2].state.load):
         trail = trail[:-1]
-    return [*trail[-2:], rested(piece, trail, found)]
+    return [*trail[-2:], rested(ring, trail, found)]

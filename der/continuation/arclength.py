@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, Generic
 
 from der.continuation.events import Events, located, regular
 from der.continuation.step import Step
@@ -27,7 +28,7 @@ def follow(
     along: Increment | None = None,
     options: Options | None = None,
     statistics: Statistics | None = None,
-) -> Iterator[Point[S]]:
+) -> Iterator[Point[Any]]:
     """Hand out the points of the path through a state, events in their places.
 
     Parameters
@@ -48,7 +49,7 @@ def follow(
 
 
 @dataclass(frozen=True)
-class _Path:
+class _Path(Generic[S]):
     """What the steps of one path share."""
 
     system: System[S]
@@ -66,7 +67,7 @@ class _Path:
             )
         return at
 
-    def points(self, start: Solution[S]) -> Iterator[Point[S]]:
+    def points(self, start: Solution[S]) -> Iterator[Point[Any]]:
         """Points from the start on."""
         options = self.options
         here = regular(self.system, self.events, start)

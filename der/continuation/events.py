@@ -77,7 +77,7 @@ class Events(Generic[S]):
 
 def regular(
     system: System[S], events: Events[S], solution: Solution[S], **entries: Any
-) -> Point[S]:
+) -> Point[Any]:
     """Return a point with the index of its solution, where that is wanted."""
     if not events.stability:
         return Point(solution, **entries)
@@ -91,8 +91,8 @@ def _stable(system: System[S]) -> Stability[S]:
 
 
 def located(
-    system: System[S], events: Events[S], step: Step[S], here: Point[S]
-) -> tuple[list[Point[S]], bool]:
+    system: System[S], events: Events[S], step: Step[S], here: Point[Any]
+) -> tuple[list[Point[Any]], bool]:
     """Return the points after ``here`` up to the end of ``step``, and whether the path ends there."""
     folds = _folds(step)
     marks, ended = _at_targets(system, events, step, folds)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, TypeAlias
 
-from der.continuation.roots import ROOT
+from der.continuation.roots import ROOT, least_rate, rate_of_cubic, root_of_rate
 from der.continuation.step import SAME, Step
 from der.problem import Solution
 
@@ -53,21 +53,16 @@ def extrema(
 
 def _extremum(step: Step[Any], low: Found, high: Found, value: Value) -> Found:
     """The place between two, and its solution, where a ``value`` turns: its rate changes sign."""
-    (s, a), (t, b) = low, high
-    (first, rate), (last, other) = value(a), value(b)
-    c1, c2, c3 = _cubic(t - s, last - first, rate, other)
-    # the root of c1 + 2 c2 u + 3 c3 u^2 between 0 and 1, where that changes its sign
-    u = -c1 / (c2 + math.copysign(math.sqrt(max(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
-    if not 0.0 < u < 1.0 and c3 != 0.0 and u != 0.0:
-        u = c1 / (3.0 * c3 * u)
-    guess = s + u * (t - s) if 0.0 < u < 1.0 else None
+    u = root_of_rate(*_rate(low, high, value))
+    guess = None if u is None else low[0] + u * (high[0] - low[0])
     return step.change(lambda at: value(at)[1], low, high, guess)
 
 
-def _cubic(length: float, jump: float, first: float, last: float) -> tuple[float, float, float]:
-    """Coefficients of u, u^2, u^3 of the cubic by its rates at u = 0 and 1, over its ``length``."""
-    mean = jump / length
-    return first, 3.0 * mean - 2.0 * first - last, first + last - 2.0 * mean
+def _rate(low: Found, high: Found, value: Value) -> tuple[float, float, float]:
+    """Coefficients of the rate of the cubic through a value and its rates at two places."""
+    (s, a), (t, b) = low, high
+    (first, rate), (last, other) = value(a), value(b)
+    return rate_of_cubic((last - first) / (t - s), rate, other)
 
 
 def _samples(
@@ -83,19 +78,16 @@ def _samples(
     ----------
     off : by how much the rate of the cubic may be wrong; None: not known.
     """
-    (s, a), (t, b) = low, high
-    (first, rate), (last, other) = value(a), value(b)
-    if rate * other <= 0.0 or t - s < SAME * step.length:
+    rates = _rate(low, high, value)
+    least = least_rate(*rates) if high[0] - low[0] >= SAME * step.length else None
+    if least is None:
         return [low, high]
-    _, c2, c3 = _cubic(t - s, last - first, rate, other)
-    u = -c2 / (3.0 * c3) if c3 != 0.0 else -1.0
-    if not 0.0 < u < 1.0:
-        return [low, high]
-    expected = rate + (2.0 * c2 + 3.0 * c3 * u) * u
+    u, expected = least
+    rate = rates[0]
     off = _ASLANT * abs(rate) if off is None else off
     if math.copysign(1.0, rate) * expected >= off:
         return [low, high]
-    place = s + u * (t - s)
+    place = low[0] + u * (high[0] - low[0])
     middle = (place, step.at(place))
     found = value(middle[1])[1]
     if found * rate < 0.0:

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import Generic
 
 from der.continuation.interpolant import Interpolant
-from der.continuation.roots import brent, root, smooth_root
+from der.continuation.roots import brent, find_root, smooth_root
 from der.errors import ContinuationFailed, Reason
 from der.problem import PARAMETER, PLANE, Increment, S, Solution, Statistics, System
 
@@ -141,7 +141,7 @@ class Step(Generic[S]):
             return self._parameter(s) - value
 
         if expected(low) * expected(high) < 0.0:
-            s = root(expected, low, high)
+            s = find_root(expected, low, high)
             guess = self.expected(s)
             found = self._newton(guess, PARAMETER, value)
             if found.converged and self._rises(s) * found.parameter_rate > 0.0:

@@ -25,7 +25,7 @@ import numpy as np
 from der.kernels.assembly import assemble
 from der.kernels.quaternions import Array, rotation, rotation_vector
 from der.rod.equilibrium import Equilibrium, equilibrium
-from der.rod.gripped_ring import Sector, free_ring
+from der.rod.gripped_ring import GrippedRing, free_ring
 from der.rod.rod import Rod, State
 from der.rod.stability import all_modes, index
 from der.rod.supports import Supports
@@ -39,15 +39,15 @@ _PLANAR = 1e-6  # of a shift that is a rigid rotation
 class Alone:
     """A configuration of the ring left alone, with the forces that balance it best."""
 
-    body: Rod  # of the full ring
-    held: Supports  # closed, one frame held; or its grips
+    rod: Rod  # of the full ring
+    supports: Supports  # closed, one frame held; or its grips
     state: State
     residual: float  # largest entry of the gradient, GJ/a
 
     @property
     def balanced(self) -> bool:
         """Whether it is an equilibrium, to rounding."""
-        stiffest = float(self.body.stiffness.max() / self.body.cell.min())
+        stiffest = float(self.rod.stiffness.max() / self.rod.cell.min())
         return self.residual <= BALANCED * stiffest
 
     @property
@@ -62,19 +62,19 @@ class Alone:
         """
         places = self._costless(least)
         if not places:
-            return self.held
-        free = self.held.free.copy()
+            return self.supports
+        free = self.supports.free.copy()
         for place in places:
             free[place] = False
-        return self.held._replace(free=free)
+        return self.supports._replace(free=free)
 
     def _costless(self, least: float = _PLANAR) -> list[tuple[int, int]]:
         """For each motion at no cost an unknown that it moves: Gauss's elimination."""
-        if np.any(self.held.turn):
+        if np.any(self.supports.turn):
             return []
         places: list[tuple[int, int]] = []
         rows: list[Array] = []
-        for mode in (shift(self.body, self.state), spin(self.body, self.state)):
+        for mode in (shift(self.rod, self.state), spin(self.rod, self.state)):
             for place, row in zip(places, rows, strict=True):
                 mode = mode - mode[place] / row[place] * row
             j, i = divmod(int(np.argmax(np.abs(mode))), mode.shape[1])
@@ -87,66 +87,66 @@ class Alone:
         """Ways down; None where it is no equilibrium, or singular."""
         if not self.balanced:
             return None
-        held = self.pinned()
-        return index(self.body, held, all_modes(held), self.state)
+        supports = self.pinned()
+        return index(self.rod, supports, all_modes(supports), self.state)
 
     def polished(self, tolerance: float = 1e-10) -> Equilibrium:
         """The equilibrium next to it, by Newton's method."""
-        return equilibrium(self.body, self.pinned(), self.state, tolerance=tolerance)
+        return equilibrium(self.rod, self.pinned(), self.state, tolerance=tolerance)
 
 
-def left_alone(piece: Sector, whole: Sector, state: State) -> Alone:
+def left_alone(ring: GrippedRing, whole: GrippedRing, state: State) -> Alone:
     """A state of a sector on ``whole``, the full ring of the same mesh, without grips."""
-    quat = piece.full_frames(state)
-    stretch = piece.full_lengths(state) / whole.body.length - 1.0
-    return balance(whole.body, quat, stretch)
+    quat = ring.full_frames(state)
+    stretch = ring.full_lengths(state) / whole.rod.length - 1.0
+    return balance(whole.rod, quat, stretch)
 
 
 def balance(
-    body: Rod, quat: Array, stretch: Array, held: Supports | None = None, load: float = 0.0
+    rod: Rod, quat: Array, stretch: Array, supports: Supports | None = None, load: float = 0.0
 ) -> Alone:
     """A configuration with the forces that balance it best, in least squares.
 
     ``held`` are its supports, none but closure if not given, turned to ``load``.
     """
-    held = free_ring(body) if held is None else held
-    nothing = np.zeros(len(held.target))
-    system = assemble(body, held, quat, stretch, nothing, load)
-    free = held.free.reshape(-1)
+    supports = free_ring(rod) if held is None else supports
+    nothing = np.zeros(len(supports.target))
+    system = assemble(rod, supports, quat, stretch, nothing, load)
+    free = supports.free.reshape(-1)
     grad = system.grad.reshape(-1)[free]
     border = system.border.reshape(len(free), -1)[free]
     force = -np.linalg.lstsq(border, grad, rcond=None)[0]
     gap = float(np.abs(system.gap).max())
     residual = max(float(np.abs(grad + border @ force).max()), gap)
-    return Alone(body, held, State(quat, stretch, force, load), residual)
+    return Alone(rod, supports, State(quat, stretch, force, load), residual)
 
 
-def shift(body: Rod, state: State) -> Array:
+def shift(rod: Rod, state: State) -> Array:
     """Rates (n, b) at which frames turn when material shifts along the curve; 0 where that costs.
 
     It costs where cells or natural strains are not alike. Edge 0 is kept where it is by a rigid
     rotation, which leaves nothing of it on a planar circle.
     """
-    n, b = body.n_edges, body.block
+    n, b = rod.n_edges, rod.block
     mode = np.zeros((n, b))
-    if np.ptp(body.cell) > _UNIFORM or np.any(np.ptp(body.rest, axis=0) > _UNIFORM):
+    if np.ptp(rod.cell) > _UNIFORM or np.any(np.ptp(rod.rest, axis=0) > _UNIFORM):
         return mode
-    turn = rotation_vector(state.quat, np.roll(state.quat, -1, axis=0)) / body.cell[:, None]
+    turn = rotation_vector(state.quat, np.roll(state.quat, -1, axis=0)) / rod.cell[:, None]
     rate = 0.5 * (turn + np.roll(turn, 1, axis=0))
     frames = rotation(state.quat)
     mode[:, :3] = rate - np.einsum("nji,j->ni", frames, frames[0] @ rate[0])
     return mode if float(np.abs(mode).max()) > _PLANAR else np.zeros((n, b))
 
 
-def spin(body: Rod, state: State) -> Array:
+def spin(rod: Rod, state: State) -> Array:
     """Rates (n, b) at which frames turn when each spins about its tangent; 0 where that costs.
 
     It does where the natural ring is bent or the section has a stiff and a weak side. Edge 0 is
     kept where it is by a rigid rotation.
     """
-    mode = np.zeros((body.n_edges, body.block))
-    stiff = body.stiffness
-    if abs(stiff[0] - stiff[1]) > _UNIFORM * stiff[0] or np.any(np.abs(body.rest) > _UNIFORM):
+    mode = np.zeros((rod.n_edges, rod.block))
+    stiff = rod.stiffness
+    if abs(stiff[0] - stiff[1]) > _UNIFORM * stiff[0] or np.any(np.abs(rod.rest) > _UNIFORM):
         return mode
     frames = rotation(state.quat)
     mode[:, :3] = np.array([0.0, 0.0, 1.0]) - np.einsum("nji,j->ni", frames, frames[0][:, 2])

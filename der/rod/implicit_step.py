@@ -45,16 +45,16 @@ class Stepped:
     residual: float  # of the forces without those of inertia: 0 at rest
 
 
-def weights(body: Rod, held: Supports) -> Array:
+def weights(rod: Rod, supports: Supports) -> Array:
     """Masses (n b + 1,) of all unknowns, held ones 0; the load's is the rod's whole length."""
-    own = body.length[:, None] * held.free
-    return np.append(own.ravel(), body.length.sum())
+    own = rod.length[:, None] * supports.free
+    return np.append(own.ravel(), rod.length.sum())
 
 
 @njit(cache=True)
 def _step(
     rod,
-    held,
+    supports,
     begin_quat,
     begin_stretch,
     begin_load,
@@ -70,15 +70,15 @@ def _step(
     tolerance,
 ):
     """Newton's method for one step; see the module's text."""
-    n, b = held.free.shape
-    n_c = held.target.shape[0]
+    n, b = supports.free.shape
+    n_c = supports.target.shape[0]
     quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
     x, y, z = np.zeros((n, b, 1)), np.zeros((n_c, 1)), np.zeros(1)
     no_row, no_border = np.zeros((n, b)), np.zeros(n_c)
     w, axis = np.zeros(n * b + 1), np.empty(3)
     outcome, iteration, residual = 1, 0, 0.0
     while True:
-        system = assemble(rod, held, quat, stretch, force, load)
+        system = assemble(rod, supports, quat, stretch, force, load)
         if system.bent_too_far >= 0:
             outcome = 3
             break
@@ -91,7 +91,7 @@ def _step(
             for i in range(b):
                 k = j * b + i
                 x[j, i, 0] = 0.0
-                if not held.free[j, i]:
+                if not supports.free[j, i]:
                     system.load_column[j, i] = 0.0
                     continue
                 w[k] = turns[j, i] if i < 3 else stretch[j] - begin_stretch[j]
@@ -115,7 +115,7 @@ def _step(
             break
         if iteration >= _ITERATIONS:
             break
-        diag, off, border = take_out(held.free, system.diag, system.off, system.border)
+        diag, off, border = take_out(supports.free, system.diag, system.off, system.border)
         factors = factor(diag, off, border)
         negative, _ = inertia(factors)
         if negative != n_c:
@@ -155,10 +155,10 @@ def _step(
         for j in range(n):
             for i in range(3):
                 axis[i] = x[j, i, 0]
-            if held.turn[j] != 0.0:
-                into_frame(quat[j], held.turn_axis, axis)
+            if supports.turn[j] != 0.0:
+                into_frame(quat[j], supports.turn_axis, axis)
                 for i in range(3):
-                    axis[i] *= held.turn[j] * z[0]
+                    axis[i] *= supports.turn[j] * z[0]
             turned(quat[j], axis, quat[j])
             if b == 4:
                 stretch[j] += x[j, 3, 0]
@@ -182,8 +182,8 @@ def _step(
 
 
 def step(
-    body: Rod,
-    held: Supports,
+    rod: Rod,
+    supports: Supports,
     begin: State,
     guess: State,
     *,
@@ -211,10 +211,10 @@ def step(
     Failure to converge is a value: see `Stepped.outcome`; a matrix that is singular or not positive
     on the conditions is `Outcome.SINGULAR`. A shorter step helps.
     """
-    check_cut(body, held.free)
+    check_cut(rod, supports.free)
     outcome, where, iterations, quat, stretch, force, load, w, energy, now, residual = _step(
-        body,
-        held,
+        rod,
+        supports,
         begin.quat,
         begin.stretch,
         float(begin.load),
@@ -233,16 +233,16 @@ def step(
     return Stepped(state, Outcome(outcome), where, iterations, w, energy, now, residual)
 
 
-def on_the_conditions(body: Rod, held: Supports, start: State) -> Stepped:
+def on_the_conditions(rod: Rod, supports: Supports, start: State) -> Stepped:
     """``start`` moved onto its conditions by the shortest way, in the metric of the masses.
 
     Its multipliers stay those of the start: the ones of so short a step are no internal forces.
     """
-    mass = weights(body, held)
+    mass = weights(rod, supports)
     still = np.zeros(len(mass))
     found = step(
-        body,
-        held,
+        rod,
+        supports,
         start,
         start,
         mass=mass,

@@ -118,7 +118,7 @@ class Relaxed:
 
 
 @njit(cache=True)
-def _balance(held, masses, aim, pull):
+def _balance(supports, masses, aim, pull):
     """Add the forces that keep accelerations on the conditions; returns the largest residual.
 
     F = -(B' M^-1 B)^-1 B' M^-1 grad.
@@ -142,7 +142,7 @@ def _balance(held, masses, aim, pull):
         for i in range(b):
             for k in range(m):
                 pull.grad[j, i] += pull.border[j, i, k] * pull.force[k]
-            if held.free[j, i] and not abs(pull.grad[j, i]) <= largest:  # true for NaN, too
+            if supports.free[j, i] and not abs(pull.grad[j, i]) <= largest:  # true for NaN, too
                 largest = abs(pull.grad[j, i])
     return largest
 
@@ -182,15 +182,15 @@ def _accelerate(pull, masses, moment, time, motion):
 
 
 @njit(cache=True)
-def _go(held, time, velocity, rate, motion):
+def _go(supports, time, velocity, rate, motion):
     """Move for ``time`` steps at a velocity."""
     n, b = velocity.shape
     w = np.empty(3)
     for j in range(n):
-        if held.turn[j] != 0.0:
-            into_frame(motion.quat[j], held.turn_axis, w)
+        if supports.turn[j] != 0.0:
+            into_frame(motion.quat[j], supports.turn_axis, w)
             for i in range(3):
-                w[i] *= time * held.turn[j] * rate[0]
+                w[i] *= time * supports.turn[j] * rate[0]
         else:
             for i in range(3):
                 w[i] = time * velocity[j, i]
@@ -207,12 +207,12 @@ def _stop(motion):
 
 
 @njit(cache=True)
-def _close(rod, held, masses, pull, motion):
+def _close(rod, supports, masses, pull, motion):
     """Move the rod onto its conditions, from rest to rest, by projections in the mass metric."""
     for _ in range(_PROJECTIONS):
         clear(pull.grad)
         pull.load_grad[0] = 0.0
-        conditions(rod, held, motion, pull)
+        conditions(rod, supports, motion, pull)
         gap = 0.0
         for k in range(pull.gap.shape[0]):
             gap = max(gap, abs(pull.gap[k]))
@@ -220,7 +220,7 @@ def _close(rod, held, masses, pull, motion):
             break
         condition_metric(masses, pull)
         _accelerate(pull, masses, 0.0, 0.0, motion)
-        _go(held, 1.0, motion.velocity, motion.rate, motion)
+        _go(supports, 1.0, motion.velocity, motion.rate, motion)
         _stop(motion)
 
 
@@ -271,16 +271,16 @@ def _potential(energy, aim, motion, pull):
 
 
 @njit(cache=True)
-def _relax(rod, held, aim, motion, pull, masses, album):
+def _relax(rod, supports, aim, motion, pull, masses, album):
     """Motion with kinetic damping until it ends; writes to all that follows ``aim``."""
     heaviness, kinetic, at_rest = 0.5 * _MARGIN, 0.0, 0.0
     count, restarts, kept, first, start = 0, 0, 0, 0.0, 0.0
     every = aim.every
-    weigh(rod, held, motion, heaviness, aim.frees_load, masses)
-    _close(rod, held, masses, pull, motion)
+    weigh(rod, supports, motion, heaviness, aim.frees_load, masses)
+    _close(rod, supports, masses, pull, motion)
     while True:
-        energy, bent_too_far = gradient(rod, held, motion, pull)
-        residual = _balance(held, masses, aim, pull)
+        energy, bent_too_far = gradient(rod, supports, motion, pull)
+        residual = _balance(supports, masses, aim, pull)
         if count == 0:
             first, start = residual, energy
         if every > 0 and count % every == 0:
@@ -298,23 +298,23 @@ def _relax(rod, held, aim, motion, pull, masses, album):
         kinetic = _accelerate(pull, masses, aim.moment, 0.5 if before == 0.0 else 1.0, motion)
         gained = potential > at_rest + _GAIN * max(abs(energy), 1.0)
         if kinetic >= before and not gained:
-            _go(held, 1.0, motion.velocity, motion.rate, motion)
+            _go(supports, 1.0, motion.velocity, motion.rate, motion)
             continue
-        _go(held, -0.5, motion.last, motion.last_rate, motion)
+        _go(supports, -0.5, motion.last, motion.last_rate, motion)
         _stop(motion)
         kinetic = 0.0
         restarts += 1
         heaviness *= _HEAVIER if gained else 1.0
-        weigh(rod, held, motion, heaviness, aim.frees_load, masses)
+        weigh(rod, supports, motion, heaviness, aim.frees_load, masses)
     moment = pull.load_grad[0]
     return Ended(
         outcome, bent_too_far, count, restarts, residual, kinetic, start, energy, moment, kept
     )
 
 
-def _at_rest(held: Supports, state: State) -> Motion:
+def _at_rest(supports: Supports, state: State) -> Motion:
     """A rod that is about to move."""
-    n, b = held.free.shape
+    n, b = supports.free.shape
     load = np.array([float(state.load)])
     return Motion(
         state.quat.copy(),
@@ -328,8 +328,8 @@ def _at_rest(held: Supports, state: State) -> Motion:
 
 
 def relax(
-    body: Rod,
-    held: Supports,
+    rod: Rod,
+    supports: Supports,
     start: State,
     *,
     kick: Direction | None = None,
@@ -360,22 +360,22 @@ def relax(
     -----
     Failure to come to rest is a value: see `Relaxed.outcome` and `ADVICE`.
     """
-    if body.n_edges > len(body.cell) + 1:
+    if rod.n_edges > len(rod.cell) + 1:
         raise ValueError(
-            f"body must have no more than {len(body.cell) + 1} edges on {len(body.cell)} vertices "
-            f"to be relaxed, got {body.n_edges}: a strut falls by implicit steps (gradient_flow)"
+            f"body must have no more than {len(rod.cell) + 1} edges on {len(rod.cell)} vertices "
+            f"to be relaxed, got {rod.n_edges}: a strut falls by implicit steps (gradient_flow)"
         )
     if kick is not None:
-        start = moved(held, start, kick)
-    n, b = held.free.shape
-    motion, pull = _at_rest(held, start), no_pull(held)
+        start = moved(supports, start, kick)
+    n, b = supports.free.shape
+    motion, pull = _at_rest(supports, start), no_pull(supports)
     masses = Masses(np.zeros((n, b, b)), np.zeros((n, b, b)), np.zeros(1))
     slots = min(most // every + 1, _SLOTS) if every > 0 else 0
     album = Album(np.empty((slots, n, 4)), np.empty((slots, n)), np.empty(slots), np.empty(slots))
     free = moment is not None
     aim = Aim(free, 0.0 if moment is None else moment, *stops, tolerance, most, every)
-    end = _relax(body, held, aim, motion, pull, masses, album)
-    nothing = np.zeros(len(held.target))
+    end = _relax(rod, supports, aim, motion, pull, masses, album)
+    nothing = np.zeros(len(supports.target))
     history = tuple(
         State(album.quat[k].copy(), album.stretch[k].copy(), nothing, float(album.load[k]))
         for k in range(end.kept)

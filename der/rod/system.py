@@ -66,11 +66,19 @@ class RodSystem:
     def _stack(self) -> Stack:
         return stack(list(self.modes.values()))
 
-    def heading(self, rate: float) -> Increment:
-        """Increment of the load alone."""
+    def increment(self, q: Array | None = None, load: float = 0.0) -> Increment:
+        """Return the increment (m,) of rotations and stretches ``q`` (n, b), and of the load."""
         increment = np.zeros(len(self._weight))
-        increment[-1] = rate
+        if q is not None:
+            increment[: q.size] = q.ravel()
+        increment[-1] = load
         return increment
+
+    def displacement(self, along: Increment, size: float = 1.0) -> Increment:
+        """Return ``size`` times an increment, with the multipliers left as they are."""
+        moved = size * along
+        moved[self.supports.free.size : -1] = 0.0
+        return moved
 
     def correct(
         self,
@@ -99,13 +107,13 @@ class RodSystem:
         """
         check_cut(self.rod, self.supports.free)
         if value is not None and hold == PARAMETER and value != guess.load:
-            turned = self.retract(guess, self.heading(value - guess.load))
+            turned = self.retract(guess, self.increment(load=value - guess.load))
             guess = turned.but(load=float(value))
         return correct(
             self.rod,
             self.supports,
             guess.but(load=float(guess.load)),
-            self.heading(1.0) if along is None else along,
+            self.increment(load=1.0) if along is None else along,
             (_CLOSING[hold], 0.0 if value is None else float(value)),
             tolerance=tolerance,
             iterations=iterations,

@@ -10,9 +10,9 @@ Loads on a ring that floats in space balance each other, whatever it does:
              axis; what keeps the other two directions is a couple, too. No force acts.
 
 In both the load is what is prescribed: a length, or an angle. Its conjugate dL/dload is the force
-or the couple, dU is its work, and a state's index is that of the ring in its tool, held.
+or the couple, dU is its work, and a state's index is that of the ring in its tool, supports.
 
-The ring is renumbered so that the first point is edge 0, whose frame is held: by the wrench, or to
+The ring is renumbered so that the first point is edge 0, whose frame is supports: by the wrench, or to
 take out rigid rotations. With a strut, it is cut there and stands at both ends of an open rod, in
 halves; both are held alike, so that they stay one.
 """
@@ -28,7 +28,7 @@ from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation
 from der.rod.equilibrium import equilibrium
 from der.rod.free_ring import Alone
-from der.rod.gripped_ring import E1, E2, E3, Sector, free_ring
+from der.rod.gripped_ring import E1, E2, E3, GrippedRing, free_ring
 from der.rod.rod import Rod, State
 from der.rod.stability import all_modes
 from der.rod.supports import Supports, supports
@@ -51,15 +51,15 @@ class Tool:
     points: tuple[int, int]  # edges of the ring whose middles it is put to
     direction: str  # in a word or two
     axis: Array  # (3,) in which the second point is pushed, or about which it is turned
-    piece: Sector  # the ring in the tool; its start is at load 0
+    ring: GrippedRing  # the ring in the tool; its start is at load 0
     first: float  # length of a strut at load 0, a; 0 for wrenches
     sense: float  # 1: the load lengthens, or turns to the right about the axis
     load_max: float  # at which the tool has no more room
-    body: Rod  # of the ring without it
+    rod: Rod  # of the ring without it
 
     def let_go(self, state: State) -> State:
         """A state of the ring in the tool, without it: no equilibrium in general."""
-        n, first = self.body.n_edges, self.points[0]
+        n, first = self.rod.n_edges, self.points[0]
         return State(
             np.roll(state.quat[:n], first, axis=0),
             np.roll(state.stretch[:n], first),
@@ -70,24 +70,24 @@ class Tool:
     def shape(self, state: State) -> tuple[Array, Array]:
         """Vertices (N, 3) of the ring in the tool, and the two points (2, 3) it is put to."""
         free = self.let_go(state)
-        x = vertices(free.quat, self.body.length * (1.0 + free.stretch))
-        return x, _places(self.body, free, x)[list(self.points)]
+        x = vertices(free.quat, self.rod.length * (1.0 + free.stretch))
+        return x, _places(self.rod, free, x)[list(self.points)]
 
 
-def _places(body: Rod, state: State, x: Array) -> Array:
+def _places(rod: Rod, state: State, x: Array) -> Array:
     """Points (n, 3) at which the frames of a closed ring sit, from its vertices.
 
     Edge j ends at vertex j, and its frame sits half of the cell before that.
     """
-    before = 0.5 * body.cell * (1.0 + state.stretch)
+    before = 0.5 * rod.cell * (1.0 + state.stretch)
     return np.asarray(x - before[:, None] * rotation(state.quat)[:, :, 2])
 
 
 def _renumbered(alone: Alone, first: int) -> tuple[Rod, State]:
     """The same ring with edge ``first`` for edge 0."""
-    body, state = alone.body, alone.state
-    rolled = body._replace(
-        **{name: np.roll(getattr(body, name), -first, axis=0) for name in _ROLLED}
+    rod, state = alone.rod, alone.state
+    rolled = rod._replace(
+        **{name: np.roll(getattr(rod, name), -first, axis=0) for name in _ROLLED}
     )
     return rolled, state.but(
         quat=np.roll(state.quat, -first, axis=0), stretch=np.roll(state.stretch, -first)
@@ -97,9 +97,9 @@ def _renumbered(alone: Alone, first: int) -> tuple[Rod, State]:
 _ROLLED = ("cell", "length", "mass", "rest")
 
 
-def _piece(body: Rod, held: Supports, start: State) -> Sector:
-    return Sector(
-        "full", 1, body, held, start, {"all": (1, all_modes(held))}, np.zeros(body.n_edges)
+def _piece(rod: Rod, supports: Supports, start: State) -> GrippedRing:
+    return GrippedRing(
+        "full", 1, rod, supports, start, {"all": (1, all_modes(supports))}, np.zeros(rod.n_edges)
     )
 
 
@@ -112,14 +112,14 @@ def struts(alone: Alone, points: tuple[int, int]) -> list[Tool]:
     Where the points lie in each other a strut may start in the three directions in which the ring
     yields in the direction of the push: eigenvectors of its compliance.
     """
-    body, state = _renumbered(alone, points[0])
-    far = (points[1] - points[0]) % body.n_edges
-    weight = _way(body, far)
-    length = body.length * (1.0 + state.stretch)
+    rod, state = _renumbered(alone, points[0])
+    far = (points[1] - points[0]) % rod.n_edges
+    weight = _way(rod, far)
+    length = rod.length * (1.0 + state.stretch)
     chord = (weight * length) @ rotation(state.quat)[:, :, 2]
     first = float(np.linalg.norm(chord))
-    around = float(body.length.sum())
-    along = np.cumsum(body.cell)[far - 1]
+    around = float(rod.length.sum())
+    along = np.cumsum(rod.cell)[far - 1]
     taut = _TAUT * float(min(along, around - along))
     if first > _ONE_PLACE * around:
         longer = _strutted(alone, points, chord / first, first, 1.0, taut - first, APART)
@@ -143,12 +143,12 @@ def struts(alone: Alone, points: tuple[int, int]) -> list[Tool]:
     ]
 
 
-def _way(body: Rod, far: int) -> Array:
+def _way(rod: Rod, far: int) -> Array:
     """Weights (n,) of edges whose sum leads from the middle of edge 0 to that of ``far``."""
-    weight = np.zeros(body.n_edges)
+    weight = np.zeros(rod.n_edges)
     weight[1:far] = 1.0
-    weight[0] = 0.5 * body.cell[0] / body.length[0]
-    weight[far] = 0.5 * body.cell[far - 1] / body.length[far]
+    weight[0] = 0.5 * rod.cell[0] / rod.length[0]
+    weight[far] = 0.5 * rod.cell[far - 1] / rod.length[far]
     return weight
 
 
@@ -167,15 +167,15 @@ def _strutted(
     length[0] = 0.5 * ring.cell[0]
     mass = length / length[:-1].sum()
     mass[-1] = 0.0  # how a strut turns is no distance along a path
-    body = ring._replace(length=length, mass=mass[:, None], closed=False)
+    rod = ring._replace(length=length, mass=mass[:, None], closed=False)
     closing, placed = np.ones(n + 2), np.zeros(n + 2)
     closing[-1] = 0.0
     placed[:n] = _way(ring, far)
     placed[0], placed[-1] = 1.0, -1.0
     conditions = [(weight, e, 0.0) for weight in (closing, placed) for e in (E1, E2, E3)]
-    held = supports(body, clamped=(0, n), held=tuple(conditions), reach={n + 1: sense})
-    held.free[[0, n], 3:] = True
-    held.free[-1] = [True, True, False, False][: body.block]  # nor has it a spin, or a strain
+    supports = supports(rod, clamped=(0, n), held=tuple(conditions), reach={n + 1: sense})
+    supports.free[[0, n], 3:] = True
+    supports.free[-1] = [True, True, False, False][: rod.block]  # nor has it a spin, or a strain
     quat = np.vstack([state.quat, state.quat[:1], _with_tangent(axis)])
     stretch = np.concatenate([state.stretch, [state.stretch[0], 0.0]])
     start = State(quat, stretch, np.zeros(6), 0.0)
@@ -184,11 +184,11 @@ def _strutted(
         points,
         direction,
         sense * axis,
-        _piece(body, held, start),
+        _piece(rod, supports, start),
         first,
         sense,
         load_max,
-        alone.body,
+        alone.rod,
     )
 
 
@@ -201,16 +201,16 @@ def _with_tangent(axis: Array) -> Array:
 
 def _yielding(alone: Alone, points: tuple[int, int]) -> Array:
     """Directions (3, 3), the softest first, in which a pair of forces moves its points apart."""
-    body, state = _renumbered(alone, points[0])
-    far = (points[1] - points[0]) % body.n_edges
-    held = free_ring(body)
-    weight = np.tile(_way(body, far), (3, 1))
-    measured = held._replace(weight=weight, axis=np.eye(3), target=np.zeros(3))
-    border = assemble(body, measured, state.quat, state.stretch, np.zeros(3), 0.0).border
+    rod, state = _renumbered(alone, points[0])
+    far = (points[1] - points[0]) % rod.n_edges
+    supports = free_ring(rod)
+    weight = np.tile(_way(rod, far), (3, 1))
+    measured = supports._replace(weight=weight, axis=np.eye(3), target=np.zeros(3))
+    border = assemble(rod, measured, state.quat, state.stretch, np.zeros(3), 0.0).border
     compliance = np.empty((3, 3))
     for k in range(3):
-        loaded = held._replace(pull=weight[0][:, None] * np.eye(3)[k])
-        t = equilibrium(body, loaded, state).tangent
+        loaded = supports._replace(pull=weight[0][:, None] * np.eye(3)[k])
+        t = equilibrium(rod, loaded, state).tangent
         compliance[:, k] = np.einsum("jbi,jb->i", border, t.q) / t.load
     _, axes = np.linalg.eigh(0.5 * (compliance + compliance.T))
     return np.ascontiguousarray(axes.T[::-1])
@@ -227,10 +227,10 @@ def wrenches(alone: Alone, points: tuple[int, int]) -> list[Tool]:
     """
     first, second = (rotation(alone.state.quat[j]) for j in points)
     normal = _normal(alone.state)
-    x = vertices(alone.state.quat, alone.body.length * (1.0 + alone.state.stretch))
-    place = _places(alone.body, alone.state, x)
+    x = vertices(alone.state.quat, alone.rod.length * (1.0 + alone.state.stretch))
+    place = _places(alone.rod, alone.state, x)
     line = place[points[1]] - place[points[0]]
-    if float(np.linalg.norm(line)) < _ONE_PLACE * float(alone.body.length.sum()):
+    if float(np.linalg.norm(line)) < _ONE_PLACE * float(alone.rod.length.sum()):
         line = first[:, 2] + second[:, 2]
     line = line - (line @ normal) * normal
     line /= np.linalg.norm(line)
@@ -249,17 +249,17 @@ def wrenches(alone: Alone, points: tuple[int, int]) -> list[Tool]:
 def _wrenched(
     alone: Alone, points: tuple[int, int], axis: Array, sense: float, direction: str
 ) -> Tool:
-    body, state = _renumbered(alone, points[0])
-    far = (points[1] - points[0]) % body.n_edges
-    one = np.ones(body.n_edges)
-    held = supports(
-        body,
+    rod, state = _renumbered(alone, points[0])
+    far = (points[1] - points[0]) % rod.n_edges
+    one = np.ones(rod.n_edges)
+    supports = supports(
+        rod,
         clamped=(0, far),
         held=tuple((one, e, 0.0) for e in (E1, E2, E3)),
         turn={far: sense},
         turn_axis=tuple(axis),
     )
-    held.free[[0, far], 3:] = True
+    supports.free[[0, far], 3:] = True
     start = state.but(force=np.zeros(3), load=0.0)
     named = direction if sense > 0.0 else f"{direction}, reversed"
     return Tool(
@@ -267,11 +267,11 @@ def _wrenched(
         points,
         named,
         sense * axis,
-        _piece(body, held, start),
+        _piece(rod, supports, start),
         0.0,
         sense,
         _ROUND,
-        alone.body,
+        alone.rod,
     )
 
 

@@ -23,14 +23,14 @@ from der.analysis.landscape.landscape import FARTHEST, barriers, numerics, rest_
 from der.analysis.landscape.rest_states import with_rests
 from der.analysis.landscape.saddle_search import climb, downhill_modes
 from der.continuation.arclength import follow
-from der.continuation.events import Visit, Wanted, three_covered, visit
+from der.continuation.events import Point, Wanted, three_covered, point
 from der.continuation.richardson import extrapolated
-from der.continuation.step import Stuck, Tally
+from der.continuation.step import ContinuationFailed, Statistics
 from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation_vector
 from der.records.landscape import Barriers, Pass, Rest, Saddle
 from der.rod.equilibrium import Direction
-from der.rod.falls import Fallen
+from der.rod.falls import EndState
 from der.rod.free_ring import Alone, left_alone
 from der.rod.gradient_flow import flow
 from der.rod.rod import State
@@ -51,7 +51,7 @@ class _Found:
 
     saddle: Saddle
     alone: Alone
-    sides: tuple[Fallen, ...]
+    sides: tuple[EndState, ...]
 
 
 def free_barrier(scene: Scene) -> Pass:
@@ -95,13 +95,13 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
         why = "stopped by the user before all saddles were looked for"
     if not why and not across:
         why = "no saddle was found between the flat and the folded ring"
-    piece = scene_sector(scene, scene.sector)
+    ring = scene_sector(scene, scene.sector)
     best = across[0] if across else None
     way, shapes = _way(best) if best is not None else (np.zeros((0, 2)), np.zeros((0, 0, 3)))
     return Pass(
         scene.ring.to_json(),
         asdict(scene.section),
-        numerics(scene, piece),
+        numerics(scene, ring),
         None if best is None else best.saddle.energy - rests[0].energy,
         None if best is None else best.saddle.energy - rests[-1].energy,
         twisting,
@@ -118,7 +118,7 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
 
 def twisted_rests(scene: Scene) -> tuple[list[Rest], list[Alone], Barriers, str]:
     """Rests on the path of twisting, the same without grips, and why there is no pass."""
-    piece, whole = scene_sector(scene, scene.sector), scene_sector(scene, "full")
+    ring, whole = scene_sector(scene, scene.sector), scene_sector(scene, "full")
     wanted = Wanted(
         load_max=FARTHEST,
         until_folded=True,
@@ -127,17 +127,17 @@ def twisted_rests(scene: Scene) -> tuple[list[Rest], list[Alone], Barriers, str]
         tolerance=scene.tolerance,
         most_steps=600,
     )
-    tally, message = Tally(), ""
-    visits: list[Visit] = []
+    statistics, message = Statistics(), ""
+    points: list[Point] = []
     try:
-        visits.extend(follow(piece, wanted, tally))
-        visits, at = with_rests(piece, wanted, visits, tally)
-    except Stuck as stuck:
+        points.extend(follow(ring, wanted, statistics))
+        points, at = with_rests(ring, wanted, points, statistics)
+    except ContinuationFailed as stuck:
         return [], [], barriers((), folded=False, message=str(stuck)), str(stuck)
-    folded = three_covered(piece, visits[-1].at)
+    folded = three_covered(ring, points[-1].solution)
     exact = Wanted(contacts=False, tolerance=scene.tolerance)
-    rests = [rest_of(piece, whole, visit(piece, exact, visits[k].at), k) for k in at]
-    alone = [left_alone(piece, whole, visits[k].at.state) for k in at]
+    rests = [rest_of(ring, whole, visit(ring, exact, points[k].solution), k) for k in at]
+    alone = [left_alone(ring, whole, points[k].solution.state) for k in at]
     twisting = barriers(rests, folded=folded)
     if not folded:
         message = twisting.why["fold"]
@@ -185,8 +185,8 @@ def _candidates(
                         yield reached.alone, False
                         break  # of two that mirror each other one is enough
     end = alone[-1]
-    held = end.pinned()
-    _, soft = softest_modes(end.body, held, all_modes(held), end.state, _SOFTEST)
+    supports = end.pinned()
+    _, soft = softest_modes(end.rod, supports, all_modes(supports), end.state, _SOFTEST)
     for mode in soft:
         reached = climb(end, mode, kick=_along(end, mode, _KICK))
         if reached is not None and reached.is_saddle:
@@ -195,7 +195,7 @@ def _candidates(
 
 def _along(alone: Alone, mode: Array, size: float) -> Array:
     """Displacement by ``size``, root mean square, along a mode of unit norm in the lengths."""
-    return size * math.sqrt(float(alone.body.length.sum())) * mode
+    return size * math.sqrt(float(alone.rod.length.sum())) * mode
 
 
 def _energy(alone: Alone) -> float:
@@ -204,13 +204,13 @@ def _energy(alone: Alone) -> float:
 
 def _described(alone: Alone, energy: float, ends: dict[str, float], *, twisted: bool) -> _Found:
     """A saddle with what can be said about it, after going down both sides."""
-    held = alone.pinned()
-    values, modes = softest_modes(alone.body, held, all_modes(held), alone.state, 3)
+    supports = alone.pinned()
+    values, modes = softest_modes(alone.rod, supports, all_modes(supports), alone.state, 3)
     down = int(np.argmin(values))
     sides = tuple(
         flow(
-            alone.body,
-            alone.held,
+            alone.rod,
+            alone.supports,
             alone.state,
             kick=Direction(_along(alone, sign * modes[down], _NUDGE), np.zeros(3), 0.0),
             tolerance=1e-7,
@@ -231,7 +231,7 @@ def _described(alone: Alone, energy: float, ends: dict[str, float], *, twisted: 
     return _Found(saddle, alone, sides)
 
 
-def name_of_rest(side: Fallen, ends: Mapping[str, float]) -> str:
+def name_of_rest(side: EndState, ends: Mapping[str, float]) -> str:
     """Which rest a flow has come to."""
     if not side.rests:
         return "nowhere"
@@ -247,13 +247,13 @@ def _way(best: _Found) -> tuple[Array, Array]:
     flat, folded = best.sides if best.saddle.ends[0] == "flat" else best.sides[::-1]
     states: list[State] = [*flat.history[::-1], best.alone.state, *folded.history]
     energies = np.concatenate([flat.energies[::-1], [best.saddle.energy], folded.energies])
-    mass = best.alone.body.mass
+    mass = best.alone.rod.mass
     steps = [
         float(np.sqrt(np.sum(mass * rotation_vector(a.quat, b.quat) ** 2)))
         for a, b in pairwise(states)
     ]
     progress = np.append(0.0, np.cumsum(steps))
     chosen = np.unique(np.searchsorted(progress, np.linspace(0.0, progress[-1], _SHAPES)))
-    length = best.alone.body.length
+    length = best.alone.rod.length
     x = [vertices(states[k].quat, length * (1.0 + states[k].stretch)) for k in chosen]
     return np.column_stack([progress, energies]), np.array(x)

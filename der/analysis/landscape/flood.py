@@ -17,7 +17,7 @@ import numpy as np
 
 from der.kernels.quaternions import Array, rotation_vector
 from der.rod.equilibrium import ADVICE, Direction, Equilibrium, equilibrium, moved
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import relax
 from der.rod.rod import State, edges
 from der.rod.stability import all_modes, softest_modes
@@ -47,8 +47,8 @@ class Minimum:
 class Flood:
     """The grid, what was found in its cells, and why nothing was."""
 
-    piece: Sector
-    held: Supports
+    ring: GrippedRing
+    supports: Supports
     share: float  # of the grip distance that the sector spans
     gamma: Array
     distance: Array
@@ -59,42 +59,42 @@ class Flood:
 
     def supports(self, distance: float) -> Supports:
         """The supports with the grips at a distance."""
-        target = self.held.target.copy()
+        target = self.supports.target.copy()
         target[-1] = self.share * distance
-        return self.held._replace(target=target)
+        return self.supports._replace(target=target)
 
     def solve(self, cell: Cell, start: State) -> Equilibrium | None:
         """A minimum in ``cell`` from a state nearby; None, and the reason kept, without one."""
         i, j = cell
-        held, body = self.supports(self.distance[j]), self.piece.body
-        for pieces in _PIECES:
-            at = self._walked(cell, start, pieces)
-            if _is_minimum(held, at) and _apart(self.piece, start, at.state) < _NEAR:
+        supports, rod = self.supports(self.distance[j]), self.ring.rod
+        for rings in _PIECES:
+            at = self._walked(cell, start, rings)
+            if _is_minimum(supports, at) and _apart(self.ring, start, at.state) < _NEAR:
                 return at
         begin = self._turned(start, self.gamma[i])
-        fall = relax(body, held, begin, tolerance=_RELAXED, most=_MOST_GRADIENTS)
+        fall = relax(rod, supports, begin, tolerance=_RELAXED, most=_MOST_GRADIENTS)
         if fall.rests:
-            at = equilibrium(body, held, fall.state, tolerance=self.tolerance)
-            if _is_minimum(held, at):
+            at = equilibrium(rod, supports, fall.state, tolerance=self.tolerance)
+            if _is_minimum(supports, at):
                 return at
         if at.converged:
             self.reasons[cell] = "only saddles were found here"
         else:
-            self.reasons[cell] = f"no minimum was found from any neighbour: {ADVICE[at.outcome]}"
+            self.reasons[cell] = f"no minimum was found from any neighbour: {at.advice}"
         return None
 
-    def _walked(self, cell: Cell, start: State, pieces: int) -> Equilibrium:
-        """The equilibrium in ``cell`` by Newton's method, in pieces of the way from a state."""
-        span = float(edges(self.piece.body, start)[:, 2].sum()) / self.share
+    def _walked(self, cell: Cell, start: State, rings: int) -> Equilibrium:
+        """The equilibrium in ``cell`` by Newton's method, in rings of the way from a state."""
+        span = float(edges(self.ring.rod, start)[:, 2].sum()) / self.share
         goal = (self.gamma[cell[0]], self.distance[cell[1]])
         state = start
-        for k in range(1, pieces + 1):
+        for k in range(1, rings + 1):
             gamma, distance = (
-                a + (b - a) * k / pieces for a, b in zip((start.load, span), goal, strict=True)
+                a + (b - a) * k / rings for a, b in zip((start.load, span), goal, strict=True)
             )
-            begin = self._turned(state, goal[0] if k == pieces else gamma)
-            held = self.supports(goal[1] if k == pieces else distance)
-            at = equilibrium(self.piece.body, held, begin, tolerance=self.tolerance)
+            begin = self._turned(state, goal[0] if k == rings else gamma)
+            supports = self.supports(goal[1] if k == rings else distance)
+            at = equilibrium(self.ring.rod, supports, begin, tolerance=self.tolerance)
             if not at.converged:
                 break
             state = at.state
@@ -102,17 +102,17 @@ class Flood:
 
     def _turned(self, start: State, gamma: float) -> State:
         """``start`` with the grips turned to ``gamma``, nothing else moved."""
-        nothing = np.zeros(len(self.held.target))
-        turn = Direction(np.zeros(self.held.free.shape), nothing, float(gamma) - start.load)
-        return moved(self.held, start, turn).but(load=float(gamma))
+        nothing = np.zeros(len(self.supports.target))
+        turn = Direction(np.zeros(self.supports.free.shape), nothing, float(gamma) - start.load)
+        return moved(self.supports, start, turn).but(load=float(gamma))
 
     def add(self, cell: Cell, at: Equilibrium) -> bool:
         """Whether a minimum is new to its cell, which then has it."""
         known = self.minima.setdefault(cell, [])
-        energy = self.piece.copies * at.energy
+        energy = self.ring.copies * at.energy
         if len(known) >= MOST_MINIMA or (known and energy > self.ceiling):
             return False
-        if any(_apart(self.piece, one.at.state, at.state) < _SAME for one in known):
+        if any(_apart(self.ring, one.solution.state, at.state) < _SAME for one in known):
             return False
         known.append(Minimum(at, energy))
         self.reasons.pop(cell, None)
@@ -154,16 +154,16 @@ def spread(
 def shaken(flood: Flood, across: int) -> Iterator[tuple[Cell, State]]:
     """Minima of some cells, about ``across`` in each direction, kicked far along soft modes."""
     n, m = len(flood.gamma), len(flood.distance)
-    body = flood.piece.body
-    root = float(np.sqrt(body.length.sum()))
-    nothing = np.zeros(len(flood.held.target))
+    rod = flood.ring.rod
+    root = float(np.sqrt(rod.length.sum()))
+    nothing = np.zeros(len(flood.supports.target))
     for i, j in product(range(0, n, max(n // across, 1)), range(0, m, max(m // across, 1))):
         for one in flood.among((i, j))[:1]:
-            held, state = flood.supports(flood.distance[j]), one.at.state
-            _, modes = softest_modes(body, held, all_modes(held), state, _SHAKEN)
+            supports, state = flood.supports(flood.distance[j]), one.solution.state
+            _, modes = softest_modes(rod, supports, all_modes(supports), state, _SHAKEN)
             for mode, sign in product(modes, (1.0, -1.0)):
                 kick = Direction(sign * _SHAKE * root * mode, nothing, 0.0)
-                yield (i, j), moved(held, state, kick)
+                yield (i, j), moved(supports, state, kick)
 
 
 def _try(flood: Flood, cell: Cell, start: State, waiting: deque[tuple[Cell, Equilibrium]]) -> None:
@@ -172,11 +172,11 @@ def _try(flood: Flood, cell: Cell, start: State, waiting: deque[tuple[Cell, Equi
         waiting.append((cell, at))
 
 
-def _is_minimum(held: Supports, at: Equilibrium) -> bool:
-    return at.converged and at.negative == len(held.target)
+def _is_minimum(supports: Supports, at: Equilibrium) -> bool:
+    return at.converged and at.negative == len(supports.target)
 
 
-def _apart(piece: Sector, a: State, b: State) -> float:
+def _apart(ring: GrippedRing, a: State, b: State) -> float:
     """Root mean square of the rotations between two states [rad]."""
     w = rotation_vector(a.quat, b.quat)
-    return float(np.sqrt(np.sum(piece.body.mass * w * w)))
+    return float(np.sqrt(np.sum(ring.rod.mass * w * w)))

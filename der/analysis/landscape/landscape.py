@@ -17,9 +17,9 @@ import numpy as np
 from der.analysis.full_ring import shapes
 from der.analysis.landscape.rest_states import with_rests
 from der.continuation.arclength import follow
-from der.continuation.events import Visit, Wanted, full_index, three_covered, visit
+from der.continuation.events import Point, Wanted, full_index, three_covered, point
 from der.continuation.richardson import Extrapolated, extrapolated
-from der.continuation.step import Stuck, Tally
+from der.continuation.step import ContinuationFailed, Statistics
 from der.errors import STOPPED
 from der.geometry.mesh import sites
 from der.records.configurations import Shapes
@@ -27,7 +27,7 @@ from der.records.landscape import Barriers, Landscape, Rest
 from der.records.path import Path, Point, Timing, counts
 from der.rod.equilibrium import Equilibrium
 from der.rod.free_ring import left_alone
-from der.rod.gripped_ring import Sector, sector
+from der.rod.gripped_ring import GrippedRing, sector
 from der.rod.rod import edges
 from der.scene import Scene, meshes
 from der.utils.interrupts import interrupts_between_states
@@ -56,7 +56,7 @@ def landscape(
     goes: see ``path.status`` and ``path.message``. With the scene's ``error_bars`` the barriers
     are extrapolated, too.
     """
-    piece = scene_sector(scene, scene.sector)
+    ring = scene_sector(scene, scene.sector)
     wanted = Wanted(
         load_max=FARTHEST,
         until_folded=True,
@@ -66,26 +66,26 @@ def landscape(
         tolerance=scene.tolerance,
         most_steps=_MOST_STEPS,
     )
-    tally, started = Tally(), time.perf_counter()
-    visits, status, message = _followed(piece, wanted, tally, progress)
+    statistics, started = Statistics(), time.perf_counter()
+    points, status, message = _followed(ring, wanted, statistics, progress)
     with interrupts_between_states() as pressed:
         exact = replace(wanted, stability=True)  # rests are few: their index is always wanted
         try:
-            visits, at = with_rests(piece, exact, visits, tally)
-        except Stuck as stuck:
+            points, at = with_rests(ring, exact, points, statistics)
+        except ContinuationFailed as stuck:
             at, status, message = [], "not converged", str(stuck)
         whole = scene_sector(scene, "full") if index_free else None
         for k in at:
-            if visits[k].index is None:
-                visits[k] = visit(piece, exact, visits[k].at, kind=visits[k].kind)
-        rests = tuple(rest_of(piece, whole, visits[k], k) for k in at)
-        folded = bool(visits) and status == "done" and three_covered(piece, visits[-1].at)
-        timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
-        path = _path(scene, piece, visits, timing, status, message)
+            if points[k].index is None:
+                points[k] = visit(ring, exact, points[k].solution, kind=points[k].kind)
+        rests = tuple(rest_of(ring, whole, points[k], k) for k in at)
+        folded = bool(points) and status == "done" and three_covered(ring, points[-1].solution)
+        timing = Timing(time.perf_counter() - started, statistics.newton_iterations, statistics.steps)
+        path = _path(scene, ring, points, timing, status, message)
         found = Landscape(path, rests, folded, barriers(rests, folded=folded, message=message))
         bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
         extrapolates = scene.error_bars and folded
-        coarser = meshes(scene.n_edges, piece.name)[1:] if extrapolates else ()
+        coarser = meshes(scene.n_edges, ring.name)[1:] if extrapolates else ()
         coarse = [
             landscape(replace(bare, n_edges=n), index_free=False) for n in coarser if not pressed
         ]
@@ -124,9 +124,9 @@ def _without_mesh(one: Landscape, sure: Extrapolated) -> Landscape:
     return replace(one, extrapolated=values)
 
 
-def scene_sector(scene: Scene, name: str) -> Sector:
+def scene_sector(scene: Scene, name: str) -> GrippedRing:
     """The sector ``name`` of the scene's ring, on the scene's mesh."""
-    return sector(
+    return gripped_ring(
         scene.ring,
         scene.section,
         scene.n_edges,
@@ -158,102 +158,102 @@ def barriers(rests: Sequence[Rest], *, folded: bool, message: str = "") -> Barri
     return Barriers(saddle.energy - flat.energy, opening, highest, why)
 
 
-def distance(piece: Sector, at: Equilibrium) -> float:
+def distance(ring: GrippedRing, at: Equilibrium) -> float:
     """Distance between the grips along the twisting axis, a; negative where they have passed."""
-    span = float(edges(piece.body, at.state)[:, 2].sum())
-    if piece.name == "full":
-        n = piece.body.n_edges
-        e = edges(piece.body, at.state)[:, 2]
+    span = float(edges(ring.rod, at.state)[:, 2].sum())
+    if ring.name == "full":
+        n = ring.rod.n_edges
+        e = edges(ring.rod, at.state)[:, 2]
         return float(0.5 * (e[0] + e[n // 2]) + e[1 : n // 2].sum())
-    return span * (2.0 if piece.name == "quarter" else 1.0)
+    return span * (2.0 if ring.name == "quarter" else 1.0)
 
 
 def _followed(
-    piece: Sector, wanted: Wanted, tally: Tally, progress: Callable[[float], object] | None
-) -> tuple[list[Visit], str, str]:
+    ring: GrippedRing, wanted: Wanted, statistics: Statistics, progress: Callable[[float], object] | None
+) -> tuple[list[Point], str, str]:
     """The path as far as it goes, its status and a sentence about it."""
-    visits: list[Visit] = []
+    points: list[Point] = []
     try:
         with interrupts_between_states() as pressed:
-            for one in follow(piece, wanted, tally):
-                visits.append(one)
+            for one in follow(ring, wanted, statistics):
+                points.append(one)
                 if progress is not None:
-                    progress(one.at.state.load)
+                    progress(one.solution.parameter)
                 if pressed:
-                    return visits, "interrupted", STOPPED
-    except Stuck as stuck:
-        return visits, "not converged", str(stuck)
-    return visits, "done", ""
+                    return points, "interrupted", STOPPED
+    except ContinuationFailed as stuck:
+        return points, "not converged", str(stuck)
+    return points, "done", ""
 
 
-def rest_of(piece: Sector, whole: Sector | None, one: Visit, position: int) -> Rest:
+def rest_of(ring: GrippedRing, whole: GrippedRing | None, one: Point, position: int) -> Rest:
     """What is known of a rest."""
-    held = full_index(piece, one.index)
-    slope = piece.moment(one.at.slope)
+    supports = total_index(ring, one.index)
+    slope = ring.moment(one.solution.slope)
     return Rest(
-        gamma=one.at.state.load,
-        energy=piece.copies * one.at.energy,
+        gamma=one.solution.parameter,
+        energy=ring.copies * one.solution.energy,
         index_moment=None if held is None else held + (slope < 0.0),
-        index_free=None if whole is None else left_alone(piece, whole, one.at.state).index(),
+        index_free=None if whole is None else left_alone(ring, whole, one.solution.state).index(),
         slope=slope,
-        distance=distance(piece, one.at),
+        distance=distance(ring, one.solution),
         position=position,
     )
 
 
 def _path(
-    scene: Scene, piece: Sector, visits: Sequence[Visit], timing: Timing, status: str, message: str
+    scene: Scene, ring: GrippedRing, points: Sequence[Point], timing: Timing, status: str, message: str
 ) -> Path:
     """The record of what was visited."""
-    held = [full_index(piece, one.index) for one in visits]
+    supports = [total_index(ring, one.index) for one in points]
     under_moment = [
-        None if i is None or one.kind == "limit" else i + (one.at.slope < 0.0)
-        for one, i in zip(visits, held, strict=True)
+        None if i is None or one.kind == "limit" else i + (one.solution.slope < 0.0)
+        for one, i in zip(points, supports, strict=True)
     ]
     points = []
-    for k, one in enumerate(visits):
+    for k, one in enumerate(points):
         if one.kind in _KINDS:
             before, after = (
-                full_index(piece, index) for index in one.sides or (one.index, one.index)
+                total_index(ring, index) for index in one.sides or (one.index, one.index)
             )
             numbers = (
-                one.at.state.load,
-                piece.moment(one.at.moment),
-                piece.copies * one.at.energy,
+                one.solution.parameter,
+                ring.moment(one.solution.moment),
+                ring.copies * one.solution.energy,
             )
             points.append(Point(one.kind, *numbers, before, after, k, one.details))
     return Path(
         solver="der",
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
-        numerics=numerics(scene, piece),
-        gamma=np.array([one.at.state.load for one in visits]),
-        moment=np.array([piece.moment(one.at.moment) for one in visits]),
-        energy=np.array([piece.copies * one.at.energy for one in visits]),
-        index=counts(held),
+        numerics=numerics(scene, ring),
+        gamma=np.array([one.solution.parameter for one in points]),
+        moment=np.array([ring.moment(one.solution.moment) for one in points]),
+        energy=np.array([ring.copies * one.solution.energy for one in points]),
+        index=counts(supports),
         index_moment=counts(under_moment),
         points=tuple(points),
         at_pi=None,
         mode=None,
         error=None,
         timing=timing,
-        shapes=_shapes(scene, piece, visits) if scene.shapes and visits else None,
+        shapes=_shapes(scene, ring, points) if scene.shapes and points else None,
         status=status,
         message=message,
     )
 
 
-def _shapes(scene: Scene, piece: Sector, visits: Sequence[Visit]) -> Shapes:
+def _shapes(scene: Scene, ring: GrippedRing, points: Sequence[Point]) -> Shapes:
     """The full ring at every state."""
     arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
-    return shapes(piece, visits, arc_length, history=False, modes=scene.modes)
+    return shapes(ring, points, arc_length, history=False, modes=scene.modes)
 
 
-def numerics(scene: Scene, piece: Sector) -> dict[str, object]:
+def numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:
     """The numerical choices behind an answer, as they are written."""
     return {
         "n_edges": scene.n_edges,
-        "sector": piece.name,
+        "sector": ring.name,
         "curvature": scene.curvature,
         "stretch": scene.stretch,
         "a_over_t": scene.a_over_t,

@@ -157,8 +157,8 @@ def _works(search: Search, level: Search, times: int) -> dict[str, float | None]
                 for one, _ in (level.at(pair) if not any(e % times for e in best.edges) else [])
                 if (one.kind, one.direction) == (best.kind, best.direction)
             ]
-            instant = (same[0].dead if dead else same[0].held) if same else None
-            wanted = best.dead if dead else best.held
+            instant = (same[0].dead if dead else same[0].supports) if same else None
+            wanted = best.dead if dead else best.supports
             alike = instant is not None and wanted is not None and instant.event == wanted.event
             found[name] = instant.work if instant is not None and alike else None
             if dead:

@@ -32,13 +32,13 @@ from der.analysis.landscape.actuators import Tool
 from der.analysis.landscape.rest_states import without_moment
 from der.analysis.snap import heading
 from der.continuation.arclength import follow
-from der.continuation.events import Visit, Wanted
-from der.continuation.step import Step, Stuck, Tally
+from der.continuation.events import Point, Wanted
+from der.continuation.step import Step, ContinuationFailed, Statistics
 from der.rod.equilibrium import Direction, Equilibrium, equilibrium, moved
-from der.rod.falls import Fallen
+from der.rod.falls import EndState
 from der.rod.free_ring import balance
 from der.rod.gradient_flow import flow
-from der.rod.gripped_ring import Sector, free_ring
+from der.rod.gripped_ring import GrippedRing, free_ring
 from der.rod.implicit_step import on_the_conditions
 from der.rod.rod import State
 from der.rod.stability import all_modes, softest_modes
@@ -63,8 +63,8 @@ class Moment:
     force: float  # its conjugate
     energy: float
     work: float  # done by the tool up to there, GJ/a
-    index: tuple[int | None, int | None]  # ways down before and after, the push held
-    lands: Fallen | None = None  # where the ring comes to rest once it is let go
+    index: tuple[int | None, int | None]  # ways down before and after, the push supports
+    lands: EndState | None = None  # where the ring comes to rest once it is let go
 
 
 @dataclass
@@ -75,7 +75,7 @@ class March:
     folded: float  # energy of the folded ring
     alike: float  # by how much that of the same one may differ
     wanted: Wanted
-    tally: Tally
+    statistics: Statistics
     most: float  # work beyond which it is not followed
     line: list[tuple[float, float, float]] = field(default_factory=list)  # push, force, energy
     work: float = 0.0
@@ -104,60 +104,60 @@ def march(
     """
     wanted = Wanted(tool.load_max, targets=(), contacts=False, tolerance=tolerance)
     wanted = replace(wanted, most_steps=_STEPS)
-    done = March(tool, folded, alike, wanted, Tally(), most)
-    start: State | None = tool.piece.start
+    done = March(tool, folded, alike, wanted, Statistics(), most)
+    start: State | None = tool.ring.start
     while start is not None:
-        start = _marched(done, replace(tool.piece, start=start))
+        start = _marched(done, replace(tool.ring, start=start))
     return done
 
 
-def _marched(done: March, piece: Sector) -> State | None:
+def _marched(done: March, ring: GrippedRing) -> State | None:
     """Minima from one state of the ring in its tool on; where to go on from, if anywhere."""
     begin = done.folded  # what a strut has cost that starts between points in one place counts, too
-    before: Visit | None = None
+    before: Point | None = None
     came: Equilibrium | None = None
     try:
-        for one in _until_something(piece, done):
+        for one in _until_something(ring, done):
             if before is None and done.line:
-                begin = one.at.energy
-            came, before = before.at if before is not None else None, one
-            done.line.append((one.at.state.load, one.at.moment, one.at.energy))
-            done.peak = max(done.peak, one.at.moment)
+                begin = one.solution.energy
+            came, before = before.solution if before is not None else None, one
+            done.line.append((one.solution.parameter, one.solution.moment, one.solution.energy))
+            done.peak = max(done.peak, one.solution.moment)
             if one.kind == "limit" and done.dead is None:
-                work = done.work + one.at.energy - begin
-                past = moved(piece.held, one.at.state, _kick(one.at, _KICK, load=1.0))
-                done.dead = _under_dead_load(done, piece, _moment(one, work), past)
-            if done.work + one.at.energy - begin > done.most:
+                work = done.work + one.solution.energy - begin
+                past = ring.retract(one.solution.state, _kick(one.solution, _KICK, load=1.0))
+                done.dead = _under_dead_load(done, ring, _moment(one, work), past)
+            if done.work + one.solution.energy - begin > done.most:
                 done.why = f"more work than {done.most:.4g}: not followed further"
                 break
-    except Stuck as stuck:
+    except ContinuationFailed as stuck:
         done.why = str(stuck).replace("gamma", "push")  # the load of a path is a push here
     if before is None:
         done.why = "the state from which it has to go on cannot be solved for"
         return None
-    done.work += before.at.energy - begin
+    done.work += before.solution.energy - begin
     done.last = _moment(before, done.work)
     if done.why or done.last.kind == "end":
         if done.last.index[0] not in (0, None):
             done.why = f"no minimum to start from: {done.last.index[0]} ways down"
         return None
     if came is not None and done.last.kind == "pass":
-        return _carried_over(done, piece, came, before.at)
-    return _let_go(done, piece, before)
+        return _carried_over(done, ring, came, before.solution)
+    return _let_go(done, ring, before)
 
 
-def _until_something(piece: Sector, done: March) -> Iterator[Visit]:
+def _until_something(ring: GrippedRing, done: March) -> Iterator[Point]:
     """Minima at a growing push, the last one that at which something happens."""
-    before: Visit | None = None
+    before: Point | None = None
     peak = done.peak
-    for one in follow(piece, done.wanted, done.tally):
-        peak = max(peak, one.at.moment)
+    for one in follow(ring, done.wanted, done.statistics):
+        peak = max(peak, one.solution.moment)
         nothing = _NOTHING * peak
-        if before is not None and before.at.moment > nothing >= one.at.moment:
-            at = one.at
+        if before is not None and before.solution.moment > nothing >= one.solution.moment:
+            at = one.solution
             if at.moment < -nothing:
-                at = without_moment(piece, done.wanted, done.tally, before.at, at)
-            yield Visit(at, "pass", index=before.index)
+                at = without_moment(ring, done.wanted, done.statistics, before.solution, at)
+            yield Point(at, "pass", index=before.index)
             return
         yield one
         if one.kind in ("fold", "branch") or (before is None and one.index != (0,)):
@@ -165,33 +165,33 @@ def _until_something(piece: Sector, done: March) -> Iterator[Visit]:
         before = one
 
 
-def _moment(one: Visit, work: float) -> Moment:
+def _moment(one: Point, work: float) -> Moment:
     before, after = one.sides or (one.index, one.index)
     return Moment(
         one.kind or "end",
-        one.at.state,
-        one.at.state.load,
-        one.at.moment,
-        one.at.energy,
+        one.solution.state,
+        one.solution.parameter,
+        one.solution.moment,
+        one.solution.energy,
         work,
         (before[0] if before else None, after[0] if after else None),
     )
 
 
-def _let_go(done: March, piece: Sector, one: Visit) -> State | None:
+def _let_go(done: March, ring: GrippedRing, one: Point) -> State | None:
     """Let the ring go at what has happened; the state in its tool to go on from, if it folds up."""
     if done.last is None:
         return None
-    at = one.at
+    at = one.solution
     if one.kind == "fold":
         kick = _kick(at, _KICK, load=0.0)
-        landed = flow(piece.body, piece.held, at.state, kick=kick, tolerance=_AT_REST)
+        landed = flow(ring, at.state, kick=kick, tolerance=_AT_REST)
     else:
-        landed = _branched(done, piece, at)
+        landed = _branched(done, ring, at)
     done.last = replace(done.last, lands=_freed(done.tool, landed.state))
     falls = landed.energy < at.energy or landed.moment < (1.0 - _LOWER) * at.moment
     if done.dead is None and falls:
-        done.dead = _under_dead_load(done, piece, done.last, landed.state)
+        done.dead = _under_dead_load(done, ring, done.last, landed.state)
     if done.opens(done.last):
         return None
     done.falls += 1
@@ -201,23 +201,23 @@ def _let_go(done: March, piece: Sector, one: Visit) -> State | None:
     return landed.state
 
 
-def _carried_over(done: March, piece: Sector, came: Equilibrium, at: Equilibrium) -> State | None:
+def _carried_over(done: March, ring: GrippedRing, came: Equilibrium, at: Equilibrium) -> State | None:
     """Let the ring go just past a pass, further along the way it came; the march has ended."""
     free = done.tool.let_go(at.state)
-    index = balance(done.tool.body, free.quat, free.stretch).index()
-    jump = Step(piece, came, at, 1.0, done.wanted.tolerance, done.tally).jump
+    index = balance(done.tool.rod, free.quat, free.stretch).index()
+    jump = Step(ring, came, at, 1.0, done.wanted.tolerance, done.statistics).jump
     # not the tangent: where material may shift at no cost, there are two of them
-    size = _NUDGE / float(np.sqrt(np.sum(piece.body.mass * jump.q**2)))
-    over = moved(piece.held, at.state, Direction(size * jump.q, 0.0 * jump.force, 0.0))
+    size = _NUDGE / float(np.sqrt(np.sum(ring.rod.mass * jump.q**2)))
+    over = ring.retract(at.state, Direction(size * jump.q, 0.0 * jump.force, 0.0))
     if done.last is not None:
         lands = _freed(done.tool, over)
         done.last = replace(done.last, index=(done.last.index[0], index), lands=lands)
     return None
 
 
-def _freed(tool: Tool, state: State) -> Fallen:
+def _freed(tool: Tool, state: State) -> EndState:
     """Where a ring comes to rest that its tool lets go of."""
-    return flow(tool.body, free_ring(tool.body), tool.let_go(state), tolerance=_AT_REST)
+    return flow(tool.rod, free_ring(tool.rod), tool.let_go(state), tolerance=_AT_REST)
 
 
 def _kick(at: Equilibrium, size: float, *, load: float) -> Direction:
@@ -226,29 +226,26 @@ def _kick(at: Equilibrium, size: float, *, load: float) -> Direction:
     return Direction(size * t.q, 0.0 * t.force, load * size * t.load)
 
 
-def _branched(done: March, piece: Sector, at: Equilibrium) -> Fallen:
+def _branched(done: March, ring: GrippedRing, at: Equilibrium) -> EndState:
     """Where the ring comes to rest in its tool shortly past a branch point.
 
     The tool goes so far before the ring falls, and that is work, too.
     """
-    body, held = piece.body, piece.held
-    past = moved(held, at.state, heading(piece, _PAST * done.tool.load_max))
-    on = equilibrium(body, held, past, tolerance=done.wanted.tolerance)
+    rod, supports = ring.rod, ring.supports
+    past = moved(supports, at.state, ring.heading(_PAST * done.tool.load_max))
+    on = equilibrium(rod, supports, past, tolerance=done.wanted.tolerance)
     further = past.load - at.state.load
     done.work += on.energy - at.energy if on.converged else at.moment * further
-    _, (mode,) = softest_modes(body, held, all_modes(held), at.state)
-    size = _KICK / float(np.sqrt(np.sum(body.mass * mode**2)))
-    ways = [heading(piece, 0.0)._replace(q=sign * size * mode) for sign in (1.0, -1.0)]
-    lower = min(ways, key=lambda way: on_the_conditions(body, held, moved(held, past, way)).energy)
-    return flow(body, held, past, kick=lower, tolerance=_AT_REST)
+    _, (mode,) = softest_modes(rod, supports, all_modes(supports), at.state)
+    size = _KICK / float(np.sqrt(np.sum(rod.mass * mode**2)))
+    ways = [ring.heading(0.0)._replace(q=sign * size * mode) for sign in (1.0, -1.0)]
+    lower = min(ways, key=lambda way: on_the_conditions(rod, supports, moved(supports, past, way)).energy)
+    return flow(rod, supports, past, kick=lower, tolerance=_AT_REST)
 
 
-def _under_dead_load(done: March, piece: Sector, limit: Moment, start: State) -> Moment:
+def _under_dead_load(done: March, ring: GrippedRing, limit: Moment, start: State) -> Moment:
     """The limit of a dead load, with where the ring rests that falls under it and is let go."""
-    fall = flow(
-        piece.body,
-        piece.held,
-        start,
+    fall = flow(ring, start,
         moment=limit.force,
         stops=(-np.inf, done.tool.load_max),
         tolerance=_AT_REST,

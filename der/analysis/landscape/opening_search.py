@@ -90,9 +90,9 @@ def _pairs(search: Search, grid: int) -> Iterator[Pair]:
 
 def same_pair(search: Search, pair: Pair) -> Pair:
     """The first of the pairs that a symmetry of the folded ring maps onto each other."""
-    n, body = search.scene.n_edges, search.folded.body
+    n, rod = search.scene.n_edges, search.folded.rod
     i, j = pair
-    if np.ptp(body.cell) < _UNIFORM and np.all(np.ptp(body.rest, axis=0) < _UNIFORM):
+    if np.ptp(rod.cell) < _UNIFORM and np.all(np.ptp(rod.rest, axis=0) < _UNIFORM):
         apart = (j - i) % n
         return 0, min(apart, n - apart)
     images = [(i, j), (-i, -j)]
@@ -131,7 +131,7 @@ def _descend(
         if best is None or best == before:
             return
         push, _ = search.all[best]
-        if not dead and barrier is not None and push.held.work < (1.0 + TIE) * barrier:
+        if not dead and barrier is not None and push.supports.work < (1.0 + TIE) * barrier:
             return
         for pair in _around(search, push.edges, stride):
             search.at(pair)

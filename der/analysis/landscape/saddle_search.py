@@ -42,7 +42,7 @@ class Climb:
     @property
     def is_saddle(self) -> bool:
         """Whether it is a saddle of index 1."""
-        return self.at.converged and self.index == 1
+        return self.solution.converged and self.index == 1
 
 
 def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | None:
@@ -57,17 +57,17 @@ def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | N
     if kick is not None:
         here = displaced(here, kick)
     for step in range(_STEPS):
-        held = here.pinned()
+        supports = here.pinned()
         state = here.state
-        found = newton_step(here.body, held, state)
+        found = newton_step(here.rod, supports, state)
         if found is None:
             return None
         newton, grad = found
         if float(np.abs(grad).max()) < _NEARLY:
             return _polished(here, step)
-        values, modes = softest_modes(here.body, held, all_modes(held), state, _MODES)
+        values, modes = softest_modes(here.rod, supports, all_modes(supports), state, _MODES)
         # far from the saddle the followed mode is known by its shape, near to it as the only one
-        overlap = [abs(float(np.sum(here.body.length[:, None] * mode * m))) for m in modes]
+        overlap = [abs(float(np.sum(here.rod.length[:, None] * mode * m))) for m in modes]
         chosen = int(np.argmax(overlap))
         if np.sum(values < 0.0) == 1:
             chosen = int(np.argmin(values))
@@ -80,8 +80,8 @@ def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | N
 
 def downhill_modes(alone: Alone, count: int = 4) -> list[Array]:
     """Modes (n, b) of negative stiffness among the ``count`` softest, the softest first."""
-    held = alone.pinned()
-    values, modes = softest_modes(alone.body, held, all_modes(held), alone.state, count)
+    supports = alone.pinned()
+    values, modes = softest_modes(alone.rod, supports, all_modes(supports), alone.state, count)
     order = np.argsort(values)
     return [modes[k] for k in order if values[k] < 0.0]
 
@@ -90,28 +90,28 @@ def _turned(
     here: Alone, newton: Array, grad: Array, values: Array, modes: Array, chosen: int
 ) -> Array:
     """Newton's step (n, b) turned in the softest modes: uphill along the chosen one, else down."""
-    length = float(here.body.length.sum())
-    softest = _SOFT * float(here.body.stiffness.min()) * (2.0 * np.pi / length) ** 2
+    length = float(here.rod.length.sum())
+    softest = _SOFT * float(here.rod.stiffness.min()) * (2.0 * np.pi / length) ** 2
     step = newton.copy()
     for k, (value, mode) in enumerate(zip(values, modes, strict=True)):
         slope = float(np.sum(grad * mode))
         sense = 1.0 if k == chosen else -1.0
         step += (sense * slope / max(abs(value), softest) + slope / value) * mode
-    size = float(np.sqrt(np.sum(here.body.mass * step**2)))
+    size = float(np.sqrt(np.sum(here.rod.mass * step**2)))
     return step * min(1.0, _LONGEST / max(size, 1e-300))
 
 
 @njit(cache=True)
-def _system(rod, held, quat, stretch, force):
+def _system(rod, supports, quat, stretch, force):
     """Newton's step (n, b, 1) at fixed load, the gradient, and whether the matrix is regular."""
-    system = assemble(rod, held, quat, stretch, force, 0.0)
-    diag, off, border = take_out(held.free, system.diag, system.off, system.border)
+    system = assemble(rod, supports, quat, stretch, force, 0.0)
+    diag, off, border = take_out(supports.free, system.diag, system.off, system.border)
     n, b, m = border.shape
     x, y, z = np.zeros((n, b, 1)), np.zeros((m, 1)), np.zeros(1)
     none, no_row = np.zeros(m), np.zeros((n, b))
     for j in range(n):
         for i in range(b):
-            if not held.free[j, i]:
+            if not supports.free[j, i]:
                 system.grad[j, i] = 0.0
             x[j, i, 0] = -system.grad[j, i]
     factors = factor(diag, off, border)
@@ -121,31 +121,31 @@ def _system(rod, held, quat, stretch, force):
     return x, system.grad, solved
 
 
-def newton_step(body: Rod, held: Supports, state: State) -> tuple[Array, Array] | None:
+def newton_step(rod: Rod, supports: Supports, state: State) -> tuple[Array, Array] | None:
     """Newton's step and the gradient (n, b); None where the matrix is singular."""
-    step, grad, solved = _system(body, held, state.quat, state.stretch, state.force)
+    step, grad, solved = _system(rod, supports, state.quat, state.stretch, state.force)
     return (step[:, :, 0], grad) if solved else None
 
 
 def displaced(here: Alone, w: Array) -> Alone:
     """A ring displaced by ``w`` (n, b), on its conditions again, with the best forces."""
-    held, load = here.held, here.state.load
-    nothing = np.zeros(len(held.target))
-    state = moved(held, here.state, Direction(w, nothing, 0.0))
-    free = held.free.ravel()
+    supports, load = here.supports, here.state.load
+    nothing = np.zeros(len(supports.target))
+    state = moved(supports, here.state, Direction(w, nothing, 0.0))
+    free = supports.free.ravel()
     for _ in range(8):
-        system = assemble(here.body, held, state.quat, state.stretch, nothing, load)
+        system = assemble(here.rod, supports, state.quat, state.stretch, nothing, load)
         if float(np.abs(system.gap).max()) < 1e-12:
             break
         border = system.border.reshape(len(free), -1)[free]
-        back = np.zeros(held.free.shape)
-        back[held.free] = np.linalg.lstsq(border.T, -system.gap, rcond=None)[0]
-        state = moved(held, state, Direction(back, nothing, 0.0))
-    return balance(here.body, state.quat, state.stretch, held, load)
+        back = np.zeros(supports.free.shape)
+        back[supports.free] = np.linalg.lstsq(border.T, -system.gap, rcond=None)[0]
+        state = moved(supports, state, Direction(back, nothing, 0.0))
+    return balance(here.rod, state.quat, state.stretch, supports, load)
 
 
 def _polished(here: Alone, steps: int) -> Climb:
     """The equilibrium next to it, and its index with all that it leaves free."""
     at = here.polished()
-    alone = balance(here.body, at.state.quat, at.state.stretch, here.held, here.state.load)
+    alone = balance(here.rod, at.state.quat, at.state.stretch, here.supports, here.state.load)
     return Climb(alone, at, alone.index() if at.converged else None, steps)

@@ -5,7 +5,7 @@ more position condition, whose multiplier is the axial force. From the path on, 
 a grid (`landscape_flood`).
 
 Minima are those of the sector: of shapes with the symmetry of a ring in its grips. The index of
-the full ring, distance held, says where one of them can be left by breaking the symmetry.
+the full ring, distance supports, says where one of them can be left by breaking the symmetry.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from der.analysis.landscape.rest_states import with_rests
 from der.analysis.loading import follow_angle
 from der.analysis.snap import Landing
 from der.continuation.arclength import follow
-from der.continuation.events import Visit, Wanted
-from der.continuation.step import Stuck, Tally
+from der.continuation.events import Point, Wanted
+from der.continuation.step import ContinuationFailed, Statistics
 from der.errors import STOPPED
 from der.kernels.quaternions import Array
 from der.records.energy_surface import Surface
 from der.rod.equilibrium import Equilibrium
-from der.rod.gripped_ring import E3, Sector
+from der.rod.gripped_ring import E3, GrippedRing
 from der.rod.rod import State
 from der.rod.stability import index
 from der.rod.supports import Supports
@@ -74,11 +74,11 @@ def surface(
     ``reasons``.
     """
     started = time.perf_counter()
-    piece = scene_sector(scene, scene.sector)
-    if piece.name == "full":
+    ring = scene_sector(scene, scene.sector)
+    if ring.name == "full":
         raise ValueError("sector must be auto, half or quarter for a surface, got 'full'")
     angles = np.linspace(0.0, math.pi, shape[0]) if gamma is None else np.array(gamma, dtype=float)
-    tally = Tally()
+    statistics = Statistics()
     wanted = Wanted(
         load_max=FARTHEST,
         until_folded=True,
@@ -89,9 +89,9 @@ def surface(
         most_steps=600,
     )
     with interrupts_between_states() as pressed:
-        visits, message = _path(piece, wanted, tally, pressed)
-        visits, at_rest = with_rests(piece, wanted, visits, tally)
-        line = np.array([_place(piece, one.at) for one in visits])
+        points, message = _path(ring, wanted, statistics, pressed)
+        points, at_rest = with_rests(ring, wanted, points, statistics)
+        line = np.array([_place(ring, one.solution) for one in points])
         low, high = _range(scene, line[:, 1]) if distance_range is None else distance_range
         if not low < high <= 0.5 * scene.ring.length:
             raise ValueError(
@@ -99,24 +99,24 @@ def surface(
                 f"{0.5 * scene.ring.length:g}, got {(low, high)}"
             )
         flood = Flood(
-            piece,
-            _with_distance(piece),
-            0.5 if piece.name == "quarter" else 1.0,
+            ring,
+            _with_distance(ring),
+            0.5 if ring.name == "quarter" else 1.0,
             angles,
             np.linspace(low, high, shape[1]),
             scene.tolerance,
             _CEILING * float(line[:, 2].max()),
         )
-        spread(flood, _seeds(flood, visits), pressed, progress)
+        spread(flood, _seeds(flood, points), pressed, progress)
         spread(flood, shaken(flood, _SHAKES), pressed, progress)
-        fallen = _snaps(piece, wanted, angles, pressed) if snaps else ()
+        fallen = _snaps(ring, wanted, angles, pressed) if snaps else ()
     status = "interrupted" if pressed else "done"
     message = STOPPED if pressed else message
-    folds = line[[k for k, one in enumerate(visits) if one.kind == "fold"]]
+    folds = line[[k for k, one in enumerate(points) if one.kind == "fold"]]
     return Surface(
         scene.ring.to_json(),
         asdict(scene.section),
-        numerics(scene, piece) | {"shape": list(shape), "ceiling": flood.ceiling},
+        numerics(scene, ring) | {"shape": list(shape), "ceiling": flood.ceiling},
         angles,
         flood.distance,
         *_maps(flood),
@@ -131,33 +131,33 @@ def surface(
     )
 
 
-def _with_distance(piece: Sector) -> Supports:
+def _with_distance(ring: GrippedRing) -> Supports:
     """The sector's supports with the distance of its ends as their last condition."""
-    held = piece.held
-    return held._replace(
-        weight=np.vstack([held.weight, np.ones(piece.body.n_edges)]),
-        axis=np.vstack([held.axis, E3]),
-        target=np.append(held.target, 0.0),
+    supports = ring.supports
+    return supports._replace(
+        weight=np.vstack([supports.weight, np.ones(ring.rod.n_edges)]),
+        axis=np.vstack([supports.axis, E3]),
+        target=np.append(supports.target, 0.0),
     )
 
 
 def _path(
-    piece: Sector, wanted: Wanted, tally: Tally, pressed: list[int]
-) -> tuple[list[Visit], str]:
+    ring: GrippedRing, wanted: Wanted, statistics: Statistics, pressed: list[int]
+) -> tuple[list[Point], str]:
     """States of the path, as far as it goes, and a sentence where that is not to its end."""
-    visits: list[Visit] = []
+    points: list[Point] = []
     try:
-        for one in follow(piece, wanted, tally):
-            visits.append(one)
+        for one in follow(ring, wanted, statistics):
+            points.append(one)
             if pressed:
                 break
-    except Stuck as stuck:
-        return visits, f"the path of twisting: {stuck}"
-    return visits, ""
+    except ContinuationFailed as stuck:
+        return points, f"the path of twisting: {stuck}"
+    return points, ""
 
 
-def _place(piece: Sector, at: Equilibrium) -> tuple[float, float, float]:
-    return at.state.load, distance(piece, at), piece.copies * at.energy
+def _place(ring: GrippedRing, at: Equilibrium) -> tuple[float, float, float]:
+    return at.state.load, distance(ring, at), ring.copies * at.energy
 
 
 def _range(scene: Scene, along_path: Array) -> tuple[float, float]:
@@ -167,13 +167,13 @@ def _range(scene: Scene, along_path: Array) -> tuple[float, float]:
     return low - margin, min(high + margin, STRETCHED * 0.5 * scene.ring.length)
 
 
-def _seeds(flood: Flood, visits: Sequence[Visit]) -> Iterator[tuple[Cell, State]]:
+def _seeds(flood: Flood, points: Sequence[Point]) -> Iterator[tuple[Cell, State]]:
     """States of the path at the angles of the grid, each in the cell of the nearest distance."""
     for i, turn in enumerate(flood.gamma):
-        for one in visits:
-            if one.at.state.load == turn and one.kind == "":
-                away = np.abs(flood.distance - distance(flood.piece, one.at))
-                state = one.at.state  # no axial force acts on it
+        for one in points:
+            if one.solution.parameter == turn and one.kind == "":
+                away = np.abs(flood.distance - distance(flood.ring, one.solution))
+                state = one.solution.state  # no axial force acts on it
                 yield (i, int(np.argmin(away))), state.but(force=np.append(state.force, 0.0))
 
 
@@ -184,30 +184,30 @@ def _maps(
     n, m = len(flood.gamma), len(flood.distance)
     energy, moment, force = (np.full((n, m), np.nan) for _ in range(3))
     ways = np.full((n, m), -1, dtype=np.int64)
-    piece = flood.piece
+    ring = flood.ring
     for i, j in flood.minima:
         best = flood.among((i, j))[0]
         energy[i, j] = best.energy
-        moment[i, j] = piece.moment(best.at.moment)
+        moment[i, j] = ring.moment(best.solution.moment)
         # L holds + F (span - share d): dU/dd = -F share for each of the copies
-        force[i, j] = -flood.share * piece.copies * best.at.state.force[-1]
-        ways[i, j] = _index(piece, flood.supports(flood.distance[j]), best.at.state)
+        force[i, j] = -flood.share * ring.copies * best.solution.state.force[-1]
+        ways[i, j] = _index(ring, flood.supports(flood.distance[j]), best.solution.state)
     levels = tuple(
         tuple(tuple(one.energy for one in flood.among((i, j))) for j in range(m)) for i in range(n)
     )
     return energy, moment, force, ways, levels
 
 
-def _index(piece: Sector, held: Supports, state: State) -> int:
+def _index(ring: GrippedRing, supports: Supports, state: State) -> int:
     """Index of the full ring with twist and distance held; -1 where it is not known.
 
     The arms no longer know of each other: modes in phase and out of phase are alike.
     """
     total = 0
-    for label, (multiplicity, modes) in piece.classes.items():
+    for label, (multiplicity, modes) in ring.classes.items():
         if label == "in phase":
             continue
-        count = index(piece.body, held, modes, state)
+        count = index(ring.rod, supports, modes, state)
         if count is None:
             return -1
         total += count * (2 if label == "out of phase" else multiplicity)
@@ -227,28 +227,28 @@ def _reasons(flood: Flood, status: str) -> dict[Cell, str]:
     }
 
 
-def _snaps(piece: Sector, wanted: Wanted, angles: Array, pressed: list[int]) -> tuple[Array, ...]:
+def _snaps(ring: GrippedRing, wanted: Wanted, angles: Array, pressed: list[int]) -> tuple[Array, ...]:
     """Gamma, distance and energy along every snap on the way to the last angle and back."""
     asked = replace(wanted, load_max=float(angles[-1]), until_folded=False, targets=())
     found: list[Array] = []
-    before: Visit | None = None
+    before: Point | None = None
     try:
-        for one in follow_angle(piece, asked, Tally(), unload=True, every=_KEPT):
+        for one in follow_angle(ring, asked, Statistics(), unload=True, every=_KEPT):
             if isinstance(one, Landing) and one.history and before is not None:
-                found.append(_fall(piece, before.at, one))
+                found.append(_fall(ring, before.solution, one))
             before = one
             if pressed:
                 break
-    except Stuck:
+    except ContinuationFailed:
         pass  # what snapped before it is kept
     return tuple(found)
 
 
-def _fall(piece: Sector, before: Equilibrium, landing: Landing) -> Array:
+def _fall(ring: GrippedRing, before: Equilibrium, landing: Landing) -> Array:
     """Gamma, distance and energy on the way down."""
-    at = landing.at
+    at = landing.solution
     rows = [
-        (state.load, distance(piece, replace(at, state=state)), energy)
+        (state.load, distance(ring, replace(at, state=state)), energy)
         for state, energy in zip(landing.history, landing.energies, strict=True)
     ]
-    return np.array([_place(piece, before), *rows, _place(piece, at)])
+    return np.array([_place(ring, before), *rows, _place(ring, at)])

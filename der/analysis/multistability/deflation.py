@@ -73,13 +73,13 @@ def deflated(start: Alone, known: Sequence[Known], images: Images) -> Known | No
     for _ in range(_STEPS):
         if not math.isfinite(here.residual):
             return None
-        found = newton_step(here.body, here.pinned(), here.state)
+        found = newton_step(here.rod, here.pinned(), here.state)
         if found is None:
             return None
         step, grad = found
         if float(np.abs(grad).max()) < _NEARLY:
             return settled(here, known, images)
-        size = float(np.sqrt(np.sum(here.body.mass * step**2)))
+        size = float(np.sqrt(np.sum(here.rod.mass * step**2)))
         tau = _lengthened(here, step, known, images) if size > _SHORT else 1.0
         tau = math.copysign(min(abs(tau), LONGEST / max(size, 1e-300)), tau)
         here = displaced(here, tau * step)
@@ -88,11 +88,11 @@ def deflated(start: Alone, known: Sequence[Known], images: Images) -> Known | No
 
 def _lengthened(here: Alone, step: Array, known: Sequence[Known], images: Images) -> float:
     """Factor of the step at a configuration."""
-    nothing = np.zeros(len(here.held.target))
+    nothing = np.zeros(len(here.supports.target))
 
     def distances(t: float) -> Array:
-        state = moved(here.held, here.state, Direction(t * step, nothing, 0.0))
-        return nearest(images.signature(curvatures(here.body, state)), known, images)
+        state = moved(here.supports, here.state, Direction(t * step, nothing, 0.0))
+        return nearest(images.signature(curvatures(here.rod, state)), known, images)
 
     return factor(distances) if known else 1.0
 
@@ -117,11 +117,11 @@ def solved(here: Alone, images: Images) -> Known | None:
     motion of its own: what is held against it then stands in the way, so both are tried.
     """
     for held in (here.pinned(), here.pinned(_NEARLY_RIGID)):
-        at = equilibrium(here.body, held, here.state, tolerance=TOLERANCE)
+        at = equilibrium(here.rod, supports, here.state, tolerance=TOLERANCE)
         state = at.state
-        alone = balance(here.body, state.quat, state.stretch, here.held, state.load)
+        alone = balance(here.rod, state.quat, state.stretch, here.supports, state.load)
         if at.converged and alone.balanced:
-            return Known(alone, images.all_of(curvatures(here.body, state)), at.energy)
+            return Known(alone, images.all_of(curvatures(here.rod, state)), at.energy)
     return None
 
 

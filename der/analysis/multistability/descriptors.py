@@ -13,7 +13,7 @@ from der.analysis.multistability.symmetry_images import curvatures, images, repe
 from der.kernels.linking import link, twist, vertices
 from der.kernels.quaternions import Array, rotation
 from der.records.states import RingState
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State, edges
 from der.scene import CONTACTS_UP_TO
 
@@ -21,20 +21,20 @@ _FLAT = 1e-6  # a, out of the plane; rad, of strains that are zero
 _TILT = 1e-3  # rad, of the bar in a circle
 
 
-def described(whole: Sector, one: Known, name: str, index: int | None) -> RingState:
+def described(whole: GrippedRing, one: Known, name: str, index: int | None) -> RingState:
     """The record of a state."""
     alone = one.alone
-    body, state = alone.body, alone.state
-    gripped = bool(np.any(alone.held.turn))
-    k = curvatures(body, state)
+    rod, state = alone.rod, alone.state
+    gripped = bool(np.any(alone.supports.turn))
+    k = curvatures(rod, state)
     covering = turning(whole, state)
     simple = covering is None or abs(covering) == 1
     linked, writhe = None, None
     turns = float(twist(state.quat))
-    if simple and body.n_edges <= CONTACTS_UP_TO:
+    if simple and rod.n_edges <= CONTACTS_UP_TO:
         linked = link(state.quat, whole.lengths(state))[0]
         writhe = linked - turns
-    slides = images(body, alone.held, state.load).slides
+    slides = images(rod, alone.supports, state.load).slides
     return RingState(
         name,
         one.energy,
@@ -54,7 +54,7 @@ def described(whole: Sector, one: Known, name: str, index: int | None) -> RingSt
     )
 
 
-def turning(whole: Sector, state: State) -> int | None:
+def turning(whole: GrippedRing, state: State) -> int | None:
     """Turns of the tangent of a planar centreline, about d1 where it is normal to the plane.
 
     Where the bar lies on its side, the sense is that of the greater turning. None in space.
@@ -64,7 +64,7 @@ def turning(whole: Sector, state: State) -> int | None:
     normal = np.linalg.svd(x, full_matrices=False)[2][2]
     if float(np.abs(x @ normal).max()) > _FLAT:
         return None
-    tangents = edges(whole.body, state)
+    tangents = edges(whole.rod, state)
     after = np.roll(tangents, -1, axis=0)
     angle = np.arctan2(np.cross(tangents, after) @ normal, np.sum(tangents * after, axis=1))
     across = float(np.mean(rotation(state.quat)[:, :, 0] @ normal))
@@ -84,15 +84,15 @@ def needs_cut(quat: Array) -> bool:
     return int(np.sum(products < 0.0)) % 2 == 0
 
 
-def grip_distance(whole: Sector, state: State) -> float:
+def grip_distance(whole: GrippedRing, state: State) -> float:
     """Distance between the two grips, a."""
-    steps = edges(whole.body, state)
+    steps = edges(whole.rod, state)
     half = len(steps) // 2
     span = 0.5 * (steps[0] + steps[half]) + steps[1:half].sum(axis=0)
     return float(np.linalg.norm(span))
 
 
-def names(whole: Sector, known: Sequence[Known], indices: Sequence[int | None]) -> list[str]:
+def names(whole: GrippedRing, known: Sequence[Known], indices: Sequence[int | None]) -> list[str]:
     """A name for each state, in their order: what planar shapes are, kind and number in space."""
     plain = [
         _name(whole, one.alone.state, index) for one, index in zip(known, indices, strict=True)
@@ -106,17 +106,17 @@ def names(whole: Sector, known: Sequence[Known], indices: Sequence[int | None]) 
     return numbered
 
 
-def _name(whole: Sector, state: State, index: int | None) -> str:
+def _name(whole: GrippedRing, state: State, index: int | None) -> str:
     covering = turning(whole, state)
     in_space = "singular" if index is None else "saddle" if index else "well"
     if covering is None:
         return in_space
-    k = curvatures(whole.body, state) * whole.body.cell.sum() / (2.0 * math.pi)
+    k = curvatures(whole.rod, state) * whole.rod.cell.sum() / (2.0 * math.pi)
     spread = np.ptp(k, axis=0)
     if covering == 0:
         bent = k[:, :2].sum(axis=1)
         changes = int(np.sum(bent * np.roll(bent, 1) < 0.0))
-        uniform = float(np.ptp(whole.body.rest[:, 0])) < _FLAT  # else straights change sign as well
+        uniform = float(np.ptp(whole.rod.rest[:, 0])) < _FLAT  # else straights change sign as well
         often = f" {changes // 2} times" if uniform and changes > 2 else ""
         return f"figure eight{often}{_rolled(k, spread, 1)}"
     number = {2: "two", 3: "three", 4: "four", 5: "five"}.get(abs(covering), str(abs(covering)))

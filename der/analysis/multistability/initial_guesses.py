@@ -27,10 +27,10 @@ from der.analysis.landscape.saddle_search import displaced
 from der.continuation.arclength import follow
 from der.continuation.events import Wanted
 from der.continuation.roots import find_root
-from der.continuation.step import Stuck, Tally
+from der.continuation.step import ContinuationFailed, Statistics
 from der.kernels.quaternions import Array, turned
 from der.rod.free_ring import Alone, balance, left_alone
-from der.rod.gripped_ring import Sector
+from der.rod.gripped_ring import GrippedRing
 from der.scene import Scene
 
 _AS_IS = np.ones(4)
@@ -39,7 +39,7 @@ _COVERED = 3  # times, or as often as the bar would like to
 _EDGES_A_COVER = 4  # at least
 
 
-def free_starts(scene: Scene, whole: Sector) -> Iterator[Alone]:
+def free_starts(scene: Scene, whole: GrippedRing) -> Iterator[Alone]:
     """Shapes of a ring without grips, the flat ring first."""
     wanted = math.ceil(abs(scene.ring.natural_ratio))
     most = min(max(_COVERED, wanted), scene.n_edges // _EDGES_A_COVER)
@@ -56,13 +56,13 @@ def free_starts(scene: Scene, whole: Sector) -> Iterator[Alone]:
     yield from twisted_rests(scene)[1]
 
 
-def gripped_starts(scene: Scene, whole: Sector, gamma: float) -> Iterator[Alone]:
+def gripped_starts(scene: Scene, whole: GrippedRing, gamma: float) -> Iterator[Alone]:
     """States on the path of twisting at a rotation of the grips, stable and unstable ones.
 
     And the mirror images of those at 2 pi - gamma: grips turned by -(2 pi - gamma) are where they
     are when turned by gamma.
     """
-    piece = scene_sector(scene, scene.sector)
+    ring = scene_sector(scene, scene.sector)
     other = 2.0 * math.pi - gamma
     wanted = Wanted(
         load_max=FARTHEST,
@@ -74,24 +74,24 @@ def gripped_starts(scene: Scene, whole: Sector, gamma: float) -> Iterator[Alone]
         most_steps=600,
     )
     try:
-        for one in follow(piece, wanted, Tally()):
-            state = one.at.state
+        for one in follow(ring, wanted, Statistics()):
+            state = one.solution.state
             for load, signs in ((gamma, _AS_IS), (other, _MIRRORED)):
                 if state.load == load:
-                    alone = left_alone(piece, whole, state)
+                    alone = left_alone(ring, whole, state)
                     quat, stretch = alone.state.quat * signs, alone.state.stretch
-                    yield balance(whole.body, quat, stretch, whole.held, gamma)
-    except Stuck:  # what was found on the way counts
+                    yield balance(whole.rod, quat, stretch, whole.supports, gamma)
+    except ContinuationFailed:  # what was found on the way counts
         return
 
 
-def covered(whole: Sector, turns: int, roll: float = 0.0) -> Alone:
+def covered(whole: GrippedRing, turns: int, roll: float = 0.0) -> Alone:
     """The ring wound ``turns`` times, planar, its bar rolled about its tangent [rad]."""
     s = whole.arc_length
-    return _bent(whole, (turns - 1) * 2.0 * math.pi * s / whole.body.cell.sum(), roll)
+    return _bent(whole, (turns - 1) * 2.0 * math.pi * s / whole.rod.cell.sum(), roll)
 
 
-def eight(whole: Sector, roll: float = 0.0) -> Alone:
+def eight(whole: GrippedRing, roll: float = 0.0) -> Alone:
     """The ring as a planar figure eight.
 
     Notes
@@ -102,19 +102,19 @@ def eight(whole: Sector, roll: float = 0.0) -> Alone:
     from scipy.special import ellipe, ellipj, ellipk
 
     m = find_root(lambda m: float(2.0 * ellipe(m) - ellipk(m)), 0.5, 0.95)
-    share = whole.arc_length / whole.body.cell.sum()
+    share = whole.arc_length / whole.rod.cell.sum()
     theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * share, m)[0])
     return _bent(whole, theta - 2.0 * math.pi * share, roll)
 
 
-def _bent(whole: Sector, more: Array, roll: float) -> Alone:
+def _bent(whole: GrippedRing, more: Array, roll: float) -> Alone:
     """The flat ring with its tangents turned in its plane by ``more`` [rad], closed again."""
     quat = np.empty_like(whole.start.quat)
     for j, (flat, angle) in enumerate(zip(whole.start.quat, more, strict=True)):
         turned(flat, np.array([angle, 0.0, 0.0]), quat[j])  # d1 is the plane's normal
         turned(quat[j], np.array([0.0, 0.0, roll]), quat[j])
-    alone = balance(whole.body, quat, np.zeros(len(more)))
-    return displaced(alone, np.zeros(alone.held.free.shape))
+    alone = balance(whole.rod, quat, np.zeros(len(more)))
+    return displaced(alone, np.zeros(alone.supports.free.shape))
 
 
 def _tilt(scene: Scene, turns: int) -> float | None:

@@ -23,7 +23,7 @@ from der.analysis.multistability.deflation import Known, deflated, recognised
 from der.analysis.multistability.descriptors import described, names
 from der.analysis.multistability.initial_guesses import free_starts, gripped_starts
 from der.analysis.multistability.symmetry_images import Images, images
-from der.analysis.multistability.transitions import Fallen, falls
+from der.analysis.multistability.transitions import EndState, falls
 from der.errors import STOPPED
 from der.kernels.linking import vertices
 from der.kernels.quaternions import rotation
@@ -31,7 +31,7 @@ from der.records.configurations import Shapes
 from der.records.states import States, Transition
 from der.rod.equilibrium import ADVICE, equilibrium
 from der.rod.free_ring import Alone
-from der.rod.gripped_ring import Sector, free_ring
+from der.rod.gripped_ring import GrippedRing, free_ring
 from der.rod.stability import all_modes, softest_modes
 from der.scene import Scene
 from der.utils.checks import checked_number, shown
@@ -75,8 +75,8 @@ def states(
     began = time.perf_counter()
     whole = scene_sector(scene, "full")
     starts = free_starts(scene, whole) if gamma is None else gripped_starts(scene, whole, gamma)
-    held = free_ring(whole.body) if gamma is None else whole.held
-    search = Search(images(whole.body, held, 0.0 if gamma is None else gamma), count)
+    supports = free_ring(whole.rod) if gamma is None else whole.supports
+    search = Search(images(whole.rod, supports, 0.0 if gamma is None else gamma), count)
     with interrupts_between_states() as pressed:
         for _ in search.run(starts):
             if progress is not None:
@@ -105,10 +105,10 @@ def check(scene: Scene, gamma: float | None, count: int) -> None:
         raise ValueError(f"n_edges must be at most {_MOST_EDGES} here, got {scene.n_edges}")
 
 
-def _flat(whole: Sector, tolerance: float) -> str:
+def _flat(whole: GrippedRing, tolerance: float) -> str:
     """What the solver says of the flat ring, where that is not at rest."""
-    at = equilibrium(whole.body, whole.held, whole.start, tolerance=tolerance)
-    return "" if at.converged else f"; the flat ring is no equilibrium: {ADVICE[at.outcome]}"
+    at = equilibrium(whole.rod, whole.supports, whole.start, tolerance=tolerance)
+    return "" if at.converged else f"; the flat ring is no equilibrium: {at.advice}"
 
 
 @dataclass
@@ -120,7 +120,7 @@ class Search:
     known: list[Known] = field(default_factory=list)
     indices: list[int | None] = field(default_factory=list)
     peaks: list[Known] = field(default_factory=list)  # with too many ways down
-    pushes: list[tuple[int, Fallen, tuple[int, ...]]] = field(default_factory=list)
+    pushes: list[tuple[int, EndState, tuple[int, ...]]] = field(default_factory=list)
     tried: int = 0
     nowhere: int = 0
 
@@ -182,16 +182,16 @@ class Search:
     def _beside(self, k: int) -> Iterator[Alone]:
         """Starts beside a state, near ones first."""
         alone = self.known[k].alone
-        held = alone.pinned()
-        _, modes = softest_modes(alone.body, held, all_modes(held), alone.state, _SOFTEST)
-        length = math.sqrt(float(alone.body.length.sum()))
+        supports = alone.pinned()
+        _, modes = softest_modes(alone.rod, supports, all_modes(supports), alone.state, _SOFTEST)
+        length = math.sqrt(float(alone.rod.length.sum()))
         for size in _SIZES:
             for mode in modes:
                 for sign in (1.0, -1.0):
                     yield displaced(alone, sign * size * length * mode)
 
 
-def record(scene: Scene, whole: Sector, search: Search, gamma: float | None) -> States:
+def record(scene: Scene, whole: GrippedRing, search: Search, gamma: float | None) -> States:
     """The record of a search, lowest state first."""
     order = sorted(range(len(search.known)), key=lambda k: search.known[k].energy)
     known = [search.known[k] for k in order]
@@ -221,7 +221,7 @@ def record(scene: Scene, whole: Sector, search: Search, gamma: float | None) -> 
     )
 
 
-def _shapes(whole: Sector, known: list[Known]) -> Shapes | None:
+def _shapes(whole: GrippedRing, known: list[Known]) -> Shapes | None:
     """Vertices and frames of the states."""
     if not known:
         return None

@@ -94,20 +94,20 @@ class Images:
         return np.sqrt(np.sum(np.abs(a - b) ** 2, axis=(1, 2)))
 
 
-def curvatures(body: Rod, state: State) -> Array:
+def curvatures(rod: Rod, state: State) -> Array:
     """Rotation vectors between neighbouring frames over the lengths between them (n, 3), 1/a."""
     turn = rotation_vector(state.quat, np.roll(state.quat, -1, axis=0))
-    return turn / body.cell[:, None]
+    return turn / rod.cell[:, None]
 
 
-def images(body: Rod, held: Supports, load: float) -> Images:
+def images(rod: Rod, supports: Supports, load: float) -> Images:
     """The ways to map a full ring on itself, in its grips turned to ``load`` if it has any."""
-    n = body.n_edges
-    gripped = bool(np.any(held.turn))
-    uniform = _equal(body.cell, body.cell[0]) and _equal(body.rest, body.rest[0])
+    n = rod.n_edges
+    gripped = bool(np.any(supports.turn))
+    uniform = _equal(rod.cell, rod.cell[0]) and _equal(rod.rest, rod.rest[0])
     slides = uniform and not gripped
-    straight = not gripped and _equal(body.rest, np.zeros(3))
-    spins = straight and slides and _equal(body.stiffness[0], body.stiffness[1])
+    straight = not gripped and _equal(rod.rest, np.zeros(3))
+    spins = straight and slides and _equal(rod.stiffness[0], rod.stiffness[1])
     shifts = [0] if slides else [0, n // 2] if gripped else list(range(n))
     signs = [np.ones(3)]
     if not gripped or math.isclose(math.sin(load), 0.0, abs_tol=1e-12):
@@ -118,13 +118,13 @@ def images(body: Rod, held: Supports, load: float) -> Images:
     for backwards in (False, True):
         for cells in shifts:
             plain = Move(np.ones(3), backwards, cells)
-            if _equal(plain.of(body.cell[:, None]), body.cell[:, None]) and _equal(
-                plain.of(body.rest), body.rest
+            if _equal(plain.of(rod.cell[:, None]), rod.cell[:, None]) and _equal(
+                plain.of(rod.rest), rod.rest
             ):
                 turned = _REVERSAL if backwards else np.ones(3)
                 moves += [Move(turned * sign, backwards, cells) for sign in signs]
-    weight = body.cell / body.cell.sum()
-    radius = float(body.cell.sum()) / (2.0 * math.pi)
+    weight = rod.cell / rod.cell.sum()
+    radius = float(rod.cell.sum()) / (2.0 * math.pi)
     return Images(tuple(moves), slides, spins, weight, radius)
 
 

@@ -30,7 +30,7 @@ _MOST_STEPS = 2000  # of a flow; most take below 200
 
 
 @dataclass(frozen=True)
-class Fallen:
+class EndState:
     """One push and what it led to."""
 
     stiffness: float  # of the mode pushed along
@@ -41,18 +41,18 @@ class Fallen:
 
 def ways_down(one: Alone, index: int) -> tuple[Array, Array]:
     """Eigenvalues (m,) and modes (m, n, b) of negative stiffness, the steepest first."""
-    held = one.pinned()
+    supports = one.pinned()
     negative = np.zeros(0, dtype=int)
     count = index + 2
     while True:
-        values, modes = softest_modes(one.body, held, all_modes(held), one.state, count)
+        values, modes = softest_modes(one.rod, supports, all_modes(supports), one.state, count)
         negative = np.argsort(values)[: int(np.sum(values < 0.0))]
         if len(negative) >= index or count >= _MOST_MODES:
             return values[negative], modes[negative]
         count = min(2 * count, _MOST_MODES)
 
 
-def falls(one: Known, index: int, images: Images) -> Iterator[Fallen]:
+def falls(one: Known, index: int, images: Images) -> Iterator[EndState]:
     """What pushes along all ways down lead to, to either side of each."""
     values, modes = ways_down(one.alone, index)
     for value, mode in zip(values, modes, strict=True):
@@ -60,30 +60,30 @@ def falls(one: Known, index: int, images: Images) -> Iterator[Fallen]:
             yield _fall(one, float(value), sign, mode, images)
 
 
-def _fall(one: Known, stiffness: float, sign: int, mode: Array, images: Images) -> Fallen:
+def _fall(one: Known, stiffness: float, sign: int, mode: Array, images: Images) -> EndState:
     rests: list[Known] = []
     here = one
     push = sign * mode
     while len(rests) < _MOST_SADDLES:
         landed = _landed(here.alone, push, images)
         if landed is None or landed.energy >= here.energy:
-            return Fallen(stiffness, sign, tuple(rests), ended=False)
+            return EndState(stiffness, sign, tuple(rests), ended=False)
         rests.append(landed)
         index = landed.alone.index()
         if index == 0:
-            return Fallen(stiffness, sign, tuple(rests), ended=True)
+            return EndState(stiffness, sign, tuple(rests), ended=True)
         if index is None:
             break
         push, here = ways_down(landed.alone, index)[1][0], landed
-    return Fallen(stiffness, sign, tuple(rests), ended=False)
+    return EndState(stiffness, sign, tuple(rests), ended=False)
 
 
 def _landed(here: Alone, push: Array, images: Images) -> Known | None:
     """The equilibrium in which the flow from a push ends; None where it does not."""
-    size = _NUDGE * math.sqrt(float(here.body.length.sum()))
-    kick = Direction(size * push, np.zeros(len(here.held.target)), 0.0)
-    fall = flow(here.body, here.held, here.state, kick=kick, tolerance=_TOLERANCE, most=_MOST_STEPS)
+    size = _NUDGE * math.sqrt(float(here.rod.length.sum()))
+    kick = Direction(size * push, np.zeros(len(here.supports.target)), 0.0)
+    fall = flow(here.rod, here.supports, here.state, kick=kick, tolerance=_TOLERANCE, most=_MOST_STEPS)
     if not fall.rests:
         return None
     state = fall.state
-    return solved(balance(here.body, state.quat, state.stretch, here.held, state.load), images)
+    return solved(balance(here.rod, state.quat, state.stretch, here.supports, state.load), images)

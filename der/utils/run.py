@@ -1,0 +1,97 @@
+"""One run loop for every analysis: Ctrl-C, failure, time and status, around what is handed out.
+
+    with Run() as run:
+        points = run.collect(follow(...), progress)
+    run.status, run.message, run.reason, run.seconds
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from types import TracebackType
+from typing import TypeVar
+
+from der.errors import ContinuationFailed, Reason
+from der.utils.interrupts import interrupts_between_states
+
+T = TypeVar("T")
+
+
+class Run:
+    """How an analysis goes: "done", "not converged" or "interrupted", and why.
+
+    Ctrl-C is noted and heard between two states; a second one is heard at once. What was found
+    before is never lost.
+    """
+
+    def __init__(self) -> None:
+        self.status = "done"
+        self.message = ""
+        self.reason: Reason | None = None
+        self.started = time.perf_counter()
+        self._pressed: list[int] = []
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Run:
+        self._pressed = self._stack.enter_context(interrupts_between_states())
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.close()
+        if self._pressed:
+            self.stop(Reason.INTERRUPTED)
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start."""
+        return time.perf_counter() - self.started
+
+    @property
+    def pressed(self) -> bool:
+        """Whether Ctrl-C was pressed since it was last heard."""
+        return bool(self._pressed)
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing has stopped it so far."""
+        return self.status == "done" and not self._pressed
+
+    def stop(self, reason: Reason, message: str = "") -> None:
+        """Note why the analysis has ended before it was done."""
+        self.status = "interrupted" if reason is Reason.INTERRUPTED else "not converged"
+        self.reason, self.message = reason, message or reason.value
+
+    def collect(
+        self, found: Iterable[T], progress: Callable[[T], object] | None = None
+    ) -> list[T]:
+        """Return everything that is handed out, until it fails or Ctrl-C is pressed."""
+        kept: list[T] = []
+
+        def keep() -> None:
+            for one in found:
+                kept.append(one)
+                if progress is not None:
+                    progress(one)
+                if self._pressed:
+                    raise KeyboardInterrupt
+
+        self.attempt(keep)
+        return kept
+
+    def attempt(self, work: Callable[[], T]) -> T | None:
+        """Return what ``work`` returns; None, and the status says why, where it fails or stops."""
+        try:
+            return work()
+        except ContinuationFailed as failed:
+            self.stop(failed.reason, str(failed))
+        except KeyboardInterrupt:
+            self._pressed.clear()  # one more must not lose what there is
+            self.stop(Reason.INTERRUPTED)
+        return None
