@@ -15,14 +15,14 @@ from der.analysis.self_crossing import gap, nearest_strands
 from der.continuation.arclength import follow
 from der.continuation.events import EIGHTH, Visit, Wanted, full_index, three_covered
 from der.continuation.step import Stuck, Tally
-from der.errors import STOPPED, Interrupted, NotConverged
+from der.errors import STOPPED, Interrupted, NotConverged, Reason
 from der.geometry.mesh import sites
 from der.geometry.ring import circle
 from der.geometry.section import section
 from der.kernels.assembly import assemble
 from der.kernels.quaternions import Array
 from der.records.configurations import Shapes
-from der.records.path import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode, release
+from der.records.path import AtPi, Mode, Path, Point, Timing, folding_mode, release
 from der.rod.equilibrium import equilibrium
 from der.rod.gripped_ring import Sector, free_ring, sector
 from der.rod.rod import State
@@ -70,7 +70,7 @@ def fold(
     piece = _piece(scene, scene.n_edges, scene.sector)
     until_folded = scene.until == "folded"
     beyond = scene.gamma_max > math.pi
-    counting = scene.stability or scene.looks_for_contacts
+    counting = scene.stability or scene.looks_for_self_crossings
     wanted = Wanted(
         load_max=math.inf if until_folded and not beyond else scene.gamma_max,
         until_folded=until_folded,
@@ -78,16 +78,16 @@ def fold(
         # who lists the states that are wanted, and nothing between them, is not slowed by others
         stride=1.0 if counting or scene.save_at is None else _STRIDE,
         stability=scene.stability,
-        contacts=scene.looks_for_contacts,
+        contacts=scene.looks_for_self_crossings,
         tolerance=scene.tolerance,
     )
     tally = Tally()
     visits: list[Visit] = []
     started = time.perf_counter()
 
-    def entries(status: str, message: str = "") -> dict[str, Any]:
+    def entries(status: str, message: str = "", reason: str = "") -> dict[str, Any]:
         timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
-        return _entries(scene, piece, visits, timing, status, message)
+        return _entries(scene, piece, visits, timing, status, message, reason)
 
     with interrupts_between_states() as pressed:
         try:
@@ -101,10 +101,11 @@ def fold(
                     watch(piece.vertices(visit.at.state))
                 if pressed:
                     raise KeyboardInterrupt
-            message = NEVER if visits[-1].at.state.load == -scene.gamma_max else ""
+            turned_back = visits[-1].at.state.load == -scene.gamma_max
 
             def done() -> dict[str, Any]:
-                return entries("done", message)
+                back = (Reason.TURNED_BACK.value, Reason.TURNED_BACK.word)
+                return entries("done", *(back if turned_back else ()))
 
             bars = scene.error_bars
             found = _with_error_bars(scene, piece, wanted, visits, done) if bars else done()
@@ -112,9 +113,12 @@ def fold(
             raise NotConverged(str(stuck), Path(**entries("not converged", str(stuck)))) from None
         except KeyboardInterrupt:
             pressed.clear()  # one more must not lose what there is
-            raise Interrupted(Path(**entries("interrupted", STOPPED))) from None
+            raise Interrupted(
+                Path(**entries("interrupted", STOPPED, Reason.INTERRUPTED.word))
+            ) from None
         if pressed:  # while the record was made
-            raise Interrupted(Path(**found | {"status": "interrupted", "message": STOPPED}))
+            ending = {"status": "interrupted", "message": STOPPED}
+            raise Interrupted(Path(**found | ending | {"reason": Reason.INTERRUPTED.word}))
     return Path(**found)
 
 
@@ -259,6 +263,7 @@ def _entries(
     timing: Timing,
     status: str,
     message: str,
+    reason: str,
 ) -> dict[str, Any]:
     """The entries of the record of what was visited."""
     indices = [full_index(piece, visit.index) for visit in visits]
@@ -284,7 +289,7 @@ def _entries(
                 gamma, moments[end], before, at_pi, three_covered=three_covered(piece, visit.at)
             )
             break
-    if message == NEVER and at_pi is None:
+    if reason == Reason.TURNED_BACK.word and at_pi is None:
         mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
     if scene.control == "moment":
         mode = None  # a ring that fell through under its moment tells nothing of its folds in gamma
@@ -309,6 +314,7 @@ def _entries(
         else None,
         "status": status,
         "message": message,
+        "reason": reason,
     }
 
 

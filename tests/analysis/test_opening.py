@@ -12,7 +12,7 @@ from rods import turned_all
 
 import der
 from der.analysis.landscape.actuators import struts, wrenches
-from der.analysis.landscape.barrier import free_barrier, twisted_rests
+from der.analysis.landscape.barrier import barrier, twisted_rests
 from der.analysis.landscape.opening import least_push
 from der.analysis.landscape.opening_path import march
 from der.analysis.landscape.opening_search import Search, refine, scan
@@ -48,8 +48,8 @@ def folded(h_over_t=4.0, n_edges=48):
 
 
 @functools.cache
-def barrier(h_over_t=4.0, n_edges=48):
-    return free_barrier(scene(h_over_t, n_edges=n_edges)).open
+def height_alone(h_over_t=4.0, n_edges=48):
+    return barrier(scene(h_over_t, n_edges=n_edges)).open
 
 
 def tool(points, direction, h_over_t=4.0, n_edges=48):
@@ -258,7 +258,7 @@ def test_a_push_to_the_pass_takes_the_free_barrier(points, direction):
     assert done.last.index == (0, 1)
     assert done.opens(done.last)
     assert done.last.lands.energy == pytest.approx(0.0, abs=1e-9)
-    assert done.last.work == pytest.approx(barrier(), abs=1e-9)
+    assert done.last.work == pytest.approx(height_alone(), abs=1e-9)
 
 
 def test_no_slow_push_takes_less_than_the_free_barrier():
@@ -268,7 +268,7 @@ def test_no_slow_push_takes_less_than_the_free_barrier():
     """
     works = [one.held.work for one in searched().pushes if one.opens]
     assert len(works) > 6
-    lowest = barrier(n_edges=24)
+    lowest = height_alone(n_edges=24)
     assert min(works) > lowest - 1e-7
     assert max(works) > 1.1 * lowest
 
@@ -277,12 +277,12 @@ def test_a_dead_load_gets_away_below_the_barrier():
     """Its limit comes before the pass; from there on it goes on working, and the ring is flat."""
     done = pushed((0, 16), "out of plane")
     assert done.dead.kind == "limit"
-    assert done.dead.work < 0.7 * barrier()
+    assert done.dead.work < 0.7 * height_alone()
     assert done.opens(done.dead)
     squeezed = pushed((0, 24), "together")
     assert squeezed.dead.kind == "branch"
     assert squeezed.dead.index == (0, 1)
-    assert squeezed.dead.work < 0.2 * barrier()
+    assert squeezed.dead.work < 0.2 * height_alone()
     assert squeezed.opens(squeezed.dead)
 
 

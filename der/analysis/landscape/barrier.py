@@ -54,7 +54,7 @@ class _Found:
     sides: tuple[Fallen, ...]
 
 
-def free_barrier(scene: Scene) -> Pass:
+def barrier(scene: Scene) -> Pass:
     """The lowest way found between the flat and the folded ring, left alone in space.
 
     Parameters

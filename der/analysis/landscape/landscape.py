@@ -90,7 +90,7 @@ def landscape(
             landscape(replace(bare, n_edges=n), index_free=False) for n in coarser if not pressed
         ]
     if pressed:
-        return replace(found, path=replace(path, status="interrupted", message=STOPPED))
+        return replace(found, path=path.interrupted())
     if not extrapolates:
         return found
     return _without_mesh(found, extrapolated([_heights(one) for one in (found, *coarse)]))

@@ -15,7 +15,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from der.analysis.landscape.barrier import free_barrier, twisted_rests
+from der.analysis.landscape.barrier import barrier, twisted_rests
 from der.analysis.landscape.landscape import numerics, scene_sector
 from der.analysis.landscape.opening_search import Search, refine, scan
 from der.continuation.richardson import Extrapolated, extrapolated
@@ -61,7 +61,7 @@ def least_push(
     started = time.perf_counter()
     grid = _grid(scene, points)
     with interrupts_between_states() as pressed:
-        alone = free_barrier(replace(scene, error_bars=False))
+        alone = barrier(replace(scene, error_bars=False))
         search, why = _begun(scene, alone)
         status = alone.status
         if search is not None and not pressed:

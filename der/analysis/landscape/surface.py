@@ -43,7 +43,7 @@ _SHAKES = 6  # cells in each direction from which minima apart from the rest are
 _KEPT = 12  # gradients between kept configurations of a snap
 
 
-def surface(
+def energy_surface(
     scene: Scene,
     *,
     shape: tuple[int, int] = (60, 60),
