@@ -291,9 +291,9 @@ def test_self_crossings_are_looked_for_while_it_is_cheap(wants, looks):
 def test_the_old_name_of_self_crossings_is_accepted_with_a_warning():
     """In the constructor, in `replace`, and as an attribute."""
     with pytest.warns(DeprecationWarning, match="self_crossings"):
-        old = scene(self_crossings=False)
+        old = scene(contacts=False)
     assert old == scene(self_crossings=False)
     with pytest.warns(DeprecationWarning, match="self_crossings"):
-        assert dataclasses.replace(scene(), self_crossings=True).self_crossings is True
+        assert dataclasses.replace(scene(), contacts=True).self_crossings is True
     with pytest.warns(DeprecationWarning, match="self_crossings"):
         assert old.contacts is False
