@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from der.analysis.compare import Comparison, compare
     from der.analysis.fold import fold
-    from der.analysis.landscape.barrier import free_barrier as barrier
+    from der.analysis.landscape.barrier import barrier
     from der.analysis.landscape.landscape import landscape
     from der.analysis.landscape.opening import least_push
-    from der.analysis.landscape.surface import surface as energy_surface
+    from der.analysis.landscape.surface import energy_surface
     from der.analysis.multistability.states import states
     from der.analysis.planar.planar_states import planar
     from der.analysis.planar.squeeze import squeeze
     from der.bvp.packing import packing_ratio
-    from der.bvp.solve import solve as solve_bvp
-    from der.diagram.diagram import phase as phase_diagram
+    from der.bvp.solve import solve_bvp
+    from der.diagram.diagram import phase_diagram
     from der.errors import Interrupted, NotConverged
     from der.geometry.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.geometry.section import Scale, Section, rectangular_section, section
@@ -76,16 +76,16 @@ _HOME = {
     "Comparison": ("der.analysis.compare", "Comparison"),
     "compare": ("der.analysis.compare", "compare"),
     "fold": ("der.analysis.fold", "fold"),
-    "barrier": ("der.analysis.landscape.barrier", "free_barrier"),
+    "barrier": ("der.analysis.landscape.barrier", "barrier"),
     "landscape": ("der.analysis.landscape.landscape", "landscape"),
     "least_push": ("der.analysis.landscape.opening", "least_push"),
-    "energy_surface": ("der.analysis.landscape.surface", "surface"),
+    "energy_surface": ("der.analysis.landscape.surface", "energy_surface"),
     "states": ("der.analysis.multistability.states", "states"),
     "planar": ("der.analysis.planar.planar_states", "planar"),
     "squeeze": ("der.analysis.planar.squeeze", "squeeze"),
     "packing_ratio": ("der.bvp.packing", "packing_ratio"),
-    "solve_bvp": ("der.bvp.solve", "solve"),
-    "phase_diagram": ("der.diagram.diagram", "phase"),
+    "solve_bvp": ("der.bvp.solve", "solve_bvp"),
+    "phase_diagram": ("der.diagram.diagram", "phase_diagram"),
     "Ring": ("der.geometry.ring", "Ring"),
     "circle": ("der.geometry.ring", "circle"),
     "ellipse": ("der.geometry.ring", "ellipse"),

@@ -32,6 +32,11 @@ class Reason(Enum):
     )
     INTERRUPTED = STOPPED
 
+    @property
+    def word(self) -> str:
+        """The name as records have it: "turned_back"."""
+        return self.name.lower()
+
 
 class ContinuationFailed(RuntimeError):
     """A path that cannot be continued.

@@ -123,9 +123,7 @@ class Stability(System[S], Protocol[S]):
     def soft(self) -> float:
         """Stiffness of a mode below which it is looked at for two changes of sign in one step."""
 
-    def indices(
-        self, state: S, symmetry: str | None = None
-    ) -> tuple[Indices, tuple[float, ...]]:
+    def indices(self, state: S, symmetry: str | None = None) -> tuple[Indices, tuple[float, ...]]:
         """Return certified index and lowest stiffness of every class, or of one."""
 
     def count(self, state: S, symmetry: str) -> int:

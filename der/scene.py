@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
+from functools import wraps
 from numbers import Integral
 
 from der.geometry.ring import Ring
@@ -20,7 +22,7 @@ COPIES = {"full": 1, "half": 2, "quarter": 4}  # how many of a sector make the r
 FEWEST_EDGES = 8
 MOST_EDGES = 65_536
 THINNEST = 1e6  # a/t; beyond, EA drowns bending in rounding
-CONTACTS_UP_TO = 1024  # edges; the writhe that finds contacts costs O(N^2)
+CROSSINGS_UP_TO = 1024  # edges; the writhe that finds self-crossings costs O(N^2)
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ class Scene:
     sector : the piece to march on: "full", "half", "quarter", or "auto", the smallest that the
         ring's symmetry allows.
     stability : whether to compute the index of the full ring at every state.
-    contacts : whether to look for passages of a strand through another; None: up to 1024 edges.
+    self_crossings : whether to look for states where the ideal curve passes through itself; None:
+        up to 1024 edges. (Its old name, ``contacts``, is accepted with a DeprecationWarning.)
     error_bars : whether to solve on a half and a quarter of the edges, too, and to extrapolate:
         the path then holds extrapolated values with their errors. From 32 edges on, divisible by
         16 on a quarter and by 8 otherwise.
@@ -70,7 +73,7 @@ class Scene:
     n_edges: int = 64
     sector: str = "auto"
     stability: bool = True
-    contacts: bool | None = None
+    self_crossings: bool | None = None
     error_bars: bool = False
     shapes: bool = False
     history: bool = False
@@ -105,8 +108,9 @@ class Scene:
         for name in ("history", "modes"):
             if getattr(self, name) and not self.shapes:
                 raise ValueError(f"{name} must come with shapes, got shapes=False")
-        if self.contacts is not None:
-            object.__setattr__(self, "contacts", truth("contacts", self.contacts))
+        if self.self_crossings is not None:
+            wanted = truth("self_crossings", self.self_crossings)
+            object.__setattr__(self, "self_crossings", wanted)
         self._check_control()
         one_of("curvature", self.curvature, MEASURES)
         one_of("stretch", self.stretch, STRETCH)
@@ -164,9 +168,38 @@ class Scene:
         return 12.0 * self.section.alpha * self.a_over_t**2 if self.stretch == "finite" else 0.0
 
     @property
-    def looks_for_contacts(self) -> bool:
-        """Whether passages of a strand through another are looked for."""
-        return self.n_edges <= CONTACTS_UP_TO if self.contacts is None else self.contacts
+    def looks_for_self_crossings(self) -> bool:
+        """Whether states where the curve passes through itself are looked for."""
+        if self.self_crossings is None:
+            return self.n_edges <= CROSSINGS_UP_TO
+        return self.self_crossings
+
+    @property
+    def contacts(self) -> bool | None:
+        """Old name of `self_crossings`."""
+        _warn_of_contacts()
+        return self.self_crossings
+
+
+def _accepting_contacts(init: Callable[..., None]) -> Callable[..., None]:
+    """`Scene.__init__` that takes ``self_crossings`` by its old name, too."""
+
+    @wraps(init)
+    def accepting(scene: Scene, *given: object, **named: object) -> None:
+        if "contacts" in named:
+            _warn_of_contacts()
+            named["self_crossings"] = named.pop("contacts")
+        init(scene, *given, **named)
+
+    return accepting
+
+
+def _warn_of_contacts() -> None:
+    text = "contacts of a der.Scene is now called self_crossings"
+    warnings.warn(text, DeprecationWarning, stacklevel=3)
+
+
+Scene.__init__ = _accepting_contacts(Scene.__init__)  # type: ignore[method-assign]
 
 
 def sector_name(ring: Ring, name: str, n_edges: int) -> str:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.analysis.landscape.barrier import free_barrier
+from der.analysis.landscape.barrier import barrier
 from der.analysis.landscape.landscape import landscape
 from der.analysis.landscape.over_thickness import barriers_over
 from scenarios.output import folder, usage
@@ -29,7 +29,7 @@ ring = der.ellipse(b_over_a=0.6)
 
 scene = der.Scene(ring, der.rectangular_section(4.0), error_bars=True)
 twisted = landscape(scene)
-found = free_barrier(scene)
+found = barrier(scene)
 
 if __name__ == "__main__":
     from der.viz.plots.landscape import figure_of_barriers, figure_of_pass

@@ -15,13 +15,13 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.analysis.landscape.surface import surface
+from der.analysis.landscape.surface import energy_surface
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
     usage(__file__, __doc__)
 
-sheet = surface(der.Scene(der.circle(), der.rectangular_section(1.6)), shape=(48, 48))
+sheet = energy_surface(der.Scene(der.circle(), der.rectangular_section(1.6)), shape=(48, 48))
 
 
 def valleys(energy: np.ndarray) -> int:

@@ -80,7 +80,7 @@ def tried(count: int, seed: int, n_edges: int = 64) -> Tried:
     for ring, section in random_rings(count, seed):
         for way, options in WAYS.items():
             started = time.process_time()
-            scene = der.Scene(ring, section, n_edges=n_edges, contacts=False, **options)  # type: ignore[arg-type]
+            scene = der.Scene(ring, section, n_edges=n_edges, self_crossings=False, **options)  # type: ignore[arg-type]
             try:
                 path = der.fold(scene)
             except der.NotConverged as failure:

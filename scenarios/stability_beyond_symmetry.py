@@ -189,7 +189,7 @@ def judged(case: Case, n_edges: int = EDGES) -> Verdict:
 def _folded(case: Case, n_edges: int, control: str) -> Path:
     """The path, as far as it goes."""
     section = der.rectangular_section(case.h_over_t)
-    scene = der.Scene(case.ring, section, n_edges=n_edges, contacts=False, control=control)
+    scene = der.Scene(case.ring, section, n_edges=n_edges, self_crossings=False, control=control)
     try:
         return der.fold(scene)
     except der.NotConverged as failure:

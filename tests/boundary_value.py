@@ -21,7 +21,6 @@ from der.bvp.collocation import Collocation, Solution, collocation
 from der.bvp.continuation import Tally, Visit, Wanted, follow
 from der.bvp.meshes import moved_to
 from der.bvp.sectors import sector
-from der.bvp.solve import solve
 
 Array = NDArray[np.float64]
 
@@ -47,7 +46,7 @@ def path(
     ring: der.Ring, h_over_t: float, nu: float = 0.3, tolerance: float = 1e-8, **wants: Any
 ) -> der.Path:
     """The path of a ring, solved once a run."""
-    return solve(scene(ring, h_over_t, nu, **wants), tolerance=tolerance)
+    return der.solve_bvp(scene(ring, h_over_t, nu, **wants), tolerance=tolerance)
 
 
 @functools.cache

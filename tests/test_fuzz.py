@@ -105,7 +105,7 @@ WANTS = {
     "until": st.one_of(st.none(), junk),
     "save_at": st.one_of(st.none(), st.lists(numbers, max_size=4), junk),
 }
-FLAGS = ("stability", "contacts", "error_bars", "shapes", "history", "modes", "unload")
+FLAGS = ("stability", "self_crossings", "error_bars", "shapes", "history", "modes", "unload")
 SIZES = ("gamma_max", "a_over_t", "tolerance")
 WANTS |= {name: st.one_of(st.booleans(), junk) for name in FLAGS}
 WANTS |= {name: st.one_of(st.floats(1e-6, 4.0), junk) for name in SIZES}

@@ -16,12 +16,12 @@ from der.rod.planar_ring import covered, planar_ring
 from der.rod.relaxation import relax
 from validation.benchmark.rows import peak_memory
 
-BARE = {"n_edges": 32, "stability": False, "contacts": False, "gamma_max": 0.6}
+BARE = {"n_edges": 32, "stability": False, "self_crossings": False, "gamma_max": 0.6}
 
 # what may be asked for -> who does it, in the module that calls it
 DOERS = {
     "stability": ({"stability": True}, "der.continuation.events.indices_and_stiffness"),
-    "contacts": ({"contacts": True}, "der.rod.gripped_ring.link"),
+    "self_crossings": ({"self_crossings": True}, "der.rod.gripped_ring.link"),
     "error bars": ({"error_bars": True}, "der.analysis.error_bars.error_bars"),
     "shapes": ({"shapes": True}, "der.analysis.full_ring.shapes"),
     "modes": ({"shapes": True, "modes": True}, "der.analysis.full_ring.softest_modes"),
@@ -66,7 +66,7 @@ def test_what_is_not_asked_for_is_not_in_the_record():
 
 def test_history_of_snaps_is_kept_only_where_it_is_asked_for():
     """A ring that snaps (h/t = 1.6) has falls with history, and none without."""
-    wants = {"n_edges": 16, "stability": False, "contacts": False, "control": "angle"}
+    wants = {"n_edges": 16, "stability": False, "self_crossings": False, "control": "angle"}
     section = der.rectangular_section(1.6)
     falls = [
         der.fold(der.Scene(der.circle(), section, shapes=True, history=asked, **wants)).shapes.falls
@@ -151,7 +151,7 @@ def test_what_is_not_asked_for_is_not_imported(wants):
     code = (
         "import json, sys, der\n"
         "scene = der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=32,"
-        f" stability=False, contacts=False, gamma_max=0.1, {wants})\n"
+        f" stability=False, self_crossings=False, gamma_max=0.1, {wants})\n"
         f"der.fold(scene)\nprint(json.dumps([n for n in {OPTIONAL!r} if n in sys.modules]))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import der
-from der.scene import CONTACTS_UP_TO, COPIES, MEASURES, Scene, sector_name
+from der.scene import COPIES, CROSSINGS_UP_TO, MEASURES, Scene, sector_name
 
 SECTION = der.rectangular_section(4.0)
 
@@ -25,7 +25,7 @@ def scene(**wants):
         ("n_edges", 64),
         ("sector", "auto"),
         ("stability", True),
-        ("contacts", None),
+        ("self_crossings", None),
         ("shapes", False),
         ("history", False),
         ("modes", False),
@@ -194,7 +194,7 @@ def test_one_saved_gamma_is_a_list_of_one():
         scene(save_at=0.5)
 
 
-@pytest.mark.parametrize("name", ["stability", "contacts", "shapes", "history", "modes"])
+@pytest.mark.parametrize("name", ["stability", "self_crossings", "shapes", "history", "modes"])
 def test_switches_are_true_or_false(name):
     """A text such as "no" is true in Python."""
     with pytest.raises(ValueError, match=rf"^{name} must be true or false, got 'no'"):
@@ -277,12 +277,23 @@ def test_an_inextensible_ring_has_no_stretching():
 @pytest.mark.parametrize(
     ("wants", "looks"),
     [
-        ({"n_edges": CONTACTS_UP_TO}, True),
-        ({"n_edges": CONTACTS_UP_TO + 4}, False),
-        ({"n_edges": CONTACTS_UP_TO + 4, "contacts": True}, True),
-        ({"contacts": False}, False),
+        ({"n_edges": CROSSINGS_UP_TO}, True),
+        ({"n_edges": CROSSINGS_UP_TO + 4}, False),
+        ({"n_edges": CROSSINGS_UP_TO + 4, "self_crossings": True}, True),
+        ({"self_crossings": False}, False),
     ],
 )
-def test_contacts_are_looked_for_while_it_is_cheap(wants, looks):
+def test_self_crossings_are_looked_for_while_it_is_cheap(wants, looks):
     """The writhe costs O(N^2), so by default up to 1024 edges."""
-    assert scene(**wants).looks_for_contacts is looks
+    assert scene(**wants).looks_for_self_crossings is looks
+
+
+def test_the_old_name_of_self_crossings_is_accepted_with_a_warning():
+    """In the constructor, in `replace`, and as an attribute."""
+    with pytest.warns(DeprecationWarning, match="self_crossings"):
+        old = scene(contacts=False)
+    assert old == scene(self_crossings=False)
+    with pytest.warns(DeprecationWarning, match="self_crossings"):
+        assert dataclasses.replace(scene(), contacts=True).self_crossings is True
+    with pytest.warns(DeprecationWarning, match="self_crossings"):
+        assert old.contacts is False

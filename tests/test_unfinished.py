@@ -7,7 +7,7 @@ import pytest
 from boundary_value import scene
 
 import der
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.utils.interrupts import interrupts_between_states, interrupts_heard, put_off
 
 SOME = 20
@@ -58,12 +58,12 @@ def test_alarms_in_kernels_come_out_as_they_are(alarm):
     Two alarms in five arrive while a kernel's results are handed over.
     """
     ring = scene(der.circle(), 1.6)
-    solve(ring)
+    solve_bvp(ring)
     for k in range(SOME):
         with pytest.raises(Alarm):  # noqa: PT012 - it may come at any time
             alarm(2e-3 + 3.1e-4 * k)
             while True:
-                solve(ring)
+                solve_bvp(ring)
 
 
 def test_ctrl_c_waits_until_results_are_handed_over():

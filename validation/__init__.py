@@ -23,7 +23,7 @@ _HOME = {
     "draw": ("der.paper", "draw"),
     "folded": ("der.bvp.folded_shape", "folded"),
     "packing_ratio": ("der.bvp.packing", "packing_ratio"),
-    "solve": ("der.bvp.solve", "solve"),
+    "solve": ("der.bvp.solve", "solve_bvp"),
 }
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from der.bvp.continuation import Point
+from der.bvp.continuation import Visit
 from der.bvp.solve import solve_visits
 from der.records.path import Path, Point
 from der.scene import Scene
@@ -144,10 +144,10 @@ def compare(
         shapes=False,
         save_at=tuple(sorted({g for g in rod.gamma.tolist() if 0.0 <= g <= _last(scene)})),
     )
-    bvp, points = solve_visits(wanted, tolerance=tolerance, progress=progress)
+    bvp, visits = solve_visits(wanted, tolerance=tolerance, progress=progress)
     scales = (float(np.abs(bvp.moment).max()), float(np.abs(bvp.energy).max()))
     kinds = {point.position: point.kind for point in rod.points}
-    regular = [point for point in points if point.kind != "fold"]
+    regular = [visit for visit in visits if visit.kind != "fold"]
     states = [
         found
         for k in range(len(rod))
@@ -167,25 +167,25 @@ def _state(
     rod: Path,
     k: int,
     kind: str,
-    points: list[Point],
+    visits: list[Visit],
     scales: tuple[float, float],
     tolerance: float,
 ) -> State | None:
     """State k of the rod beside the solution at its gamma that is nearest in M and U."""
     gamma, moment, energy = (float(getattr(rod, n)[k]) for n in ("gamma", "moment", "energy"))
 
-    def apart(point: Point) -> float:
-        at = point.solution
+    def apart(visit: Visit) -> float:
+        at = visit.at
         return math.hypot((at.moment - moment) / scales[0], (at.energy - energy) / scales[1])
 
-    here = [point for point in points if abs(point.solution.gamma - gamma) < SAME]
+    here = [visit for visit in visits if abs(visit.at.gamma - gamma) < SAME]
     if not here:
         return None
-    point = min(here, key=apart)
-    at = point.solution
+    visit = min(here, key=apart)
+    at = visit.at
     slopes = (at.slope, 4.0 * at.moment)
     errors = _errors(rod, k)
-    own = (point.error.moment, point.error.energy)
+    own = (visit.error.moment, visit.error.energy)
     distances: list[float] = []
     bars: list[float | None] = []
     for value, other, slope, scale, name, solved in zip(
@@ -204,7 +204,7 @@ def _state(
             bars.append(None)
             continue
         vertical = (errors[name] + solved) / scale
-        horizontal = (errors["gamma"] + point.error.gamma) / math.pi
+        horizontal = (errors["gamma"] + visit.error.gamma) / math.pi
         bars.append((vertical + abs(steep) * horizontal) / math.hypot(1.0, steep) + tolerance)
     if max(distances) > FAR:
         return None

@@ -1,33 +1,29 @@
 """Error bars: the path on N, N/2 and N/4 edges, extrapolated state by state (Richardson, Romberg).
 
 The states of the three meshes are matched one by one, and put where they belong on the extrapolated
-curve (`matching`). An error is the last correction that the extrapolation made.
+curve (`extrapolated_curve`). An error is the last correction that the extrapolation made.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
-from der.analysis.matching import (
-    ENERGY,
-    GAMMA,
-    LEVELS,
-    MOMENT,
-    RATE,
-    Family,
-    Place,
-    placed,
-    romberg,
-)
-from der.analysis.moved_folds import arc_lengths
-from der.continuation.events import Point
+from der.analysis.extrapolated_curve import GAMMA, LEVELS, MOMENT, RATE, Family, Place, placed
+from der.analysis.extrapolated_folds import all_asked, arc_lengths
+from der.analysis.path_record import COLUMNS, columns
+from der.analysis.request import EIGHTH, LOOSE_TURN, Request
+from der.continuation.richardson import romberg
+from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array
+from der.problem import Point
+from der.records.path import AtPi, Mode
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 
 _EXACT = 1e-9  # of the largest values: a state that is the same on every mesh, as the folded one
@@ -37,87 +33,142 @@ _SMALL = 0.01  # of the largest first correction: what is below says nothing of 
 
 @dataclass(frozen=True)
 class ErrorBars:
-    """The states of a path, extrapolated, in path order.
+    """The points of a path, extrapolated, in path order; and what the record says of it.
 
     Where a level has no state, errors are None and the values are those of N edges.
     """
 
-    order: tuple[int, ...]  # (n,) positions among the points; see `error_bars` for what is missing
-    gamma: Array  # (n,) rad
-    moment: Array  # (n,) GJ/a, of one arm
-    energy: Array  # (n,) GJ/a, of the full ring
-    gamma_error: list[float | None]  # (n,) rad; 0 where gamma was asked for
-    moment_error: list[float | None]  # (n,) GJ/a
-    energy_error: list[float | None]  # (n,) GJ/a
-    raw: dict[str, list[float]]  # gamma, moment, energy (n,) on N edges
-    slope: float | None  # dM/dgamma at the first arrival at pi, GJ/a; None: no such state
-    slope_error: float | None
-    how: str
+    points: tuple[Point[Equilibrium], ...]  # (n,) see `error_bars` for what is missing
+    values: dict[str, Array]  # gamma, moment, energy (n,)
+    raw: dict[str, list[float]]  # the same on N edges
+    error: dict[str, object]  # the record's entry
+    slope: float | None = None  # dM/dgamma at the first arrival at pi, GJ/a; None: no such state
 
-    @property
-    def error(self) -> dict[str, object]:
-        """The record's entry."""
+    def at_pi(self, at_pi: AtPi | None, mode: Mode | None) -> dict[str, AtPi | Mode | None]:
+        """Return what is recorded at pi, with the extrapolated values."""
+        if at_pi is None or mode is None or self.slope is None:
+            return {"at_pi": at_pi, "mode": mode}
+        k = self.values["gamma"].tolist().index(math.pi)
+        moment, energy = (float(self.values[name][k]) for name in ("moment", "energy"))
+        stable = self.slope > 0.0 if mode.foldable else None
         return {
-            "gamma": self.gamma_error,
-            "moment": self.moment_error,
-            "energy": self.energy_error,
-            "slope_at_pi": self.slope_error,
-            "how": self.how,
+            "at_pi": replace(at_pi, moment=moment, energy=energy, slope=self.slope),
+            "mode": replace(mode, stable=stable),
         }
 
 
 def error_bars(
-    rings: Sequence[GrippedRing],
-    points: Sequence[Point],
-    asked: Collection[float],
-    *,
-    tolerance: float = 1e-10,
+    rings: Sequence[GrippedRing], request: Request, points: Sequence[Point[Equilibrium]]
 ) -> ErrorBars:
-    """Extrapolated values and errors of a path that was followed on the finest of three meshes.
+    """Return extrapolated values and errors of a path followed on the finest of three meshes.
 
     Parameters
     ----------
     rings : the sector at the three levels, finest first (`scene.meshes`).
-    points : the path on the finest, from `path.follow`.
-    asked : values of gamma that states were solved for [rad]: there gamma stays what it is and
+    request : what the path was asked for. Where a gamma was asked for, it stays what it is, and
         moment and energy become those at this gamma on the extrapolated curve.
-    tolerance : of the residual of an equilibrium, GJ/a.
+    points : the path on the finest mesh.
 
     Notes
     -----
     Folds and limits move to those of the extrapolated curve, a little forward or backward on the
-    path. States that nobody asked for and that they overtake are left out of ``order``: their index
-    would be that of the other side. Branch and contact points are placed on N edges only; they have
-    values on the extrapolated curve, but no errors.
+    path. States that nobody asked for and that they overtake are left out: their index would be
+    that of the other side. Branch points and self-crossings are placed on N edges only; they have
+    values on the extrapolated curve, but no errors. Indices, and the mode but for its slope, are
+    those of N edges, unknown where a state passes a fold or branch point on its way to the
+    extrapolated curve. Where the path of the coarsest mesh ends elsewhere, values stay as they are,
+    and no error is known.
     """
-    family = Family(tuple(rings), tolerance)
+    end = _end(rings[-1], request, max_steps=4 * len(points) + 100)
+    if end != points[-1].solution.parameter:
+        return _without_errors(rings, points, end)
+    asked = _asked(request, points)
+    family = Family(tuple(rings), request.tolerance)
+    points = all_asked(family, request, points, asked)
     places = list(placed(family, points, asked))
     order = _order(arc_lengths(rings[0], points), places)
     scales = _scales(family, points)
-    kept = [places[k] for k in order]
-    corrections = _Corrections.of(kept, scales)
-    bounds = [corrections.bound(k) for k in range(len(kept))]
-    raw = np.array([family.values(0, points[k].solution) for k in order]).reshape(-1, RATE)
-    values = np.array(
-        [r if p is None else p.values for p, r in zip(kept, raw, strict=True)]
-    ).reshape(-1, RATE)
-    slope, slope_error = _slope_at_pi(kept, [points[k] for k in order], corrections)
-    errors: list[list[float | None]] = [
-        [None if b is None else float(b[c]) for b in bounds] for c in range(RATE)
-    ]
-    return ErrorBars(
-        tuple(order),
-        values[:, GAMMA],
-        values[:, MOMENT],
-        values[:, ENERGY],
-        errors[GAMMA],
-        errors[MOMENT],
-        errors[ENERGY],
-        dict(zip(("gamma", "moment", "energy"), raw.T.tolist(), strict=True)),
-        slope,
-        slope_error,
-        _how(rings, bounds),
+    return _bars(family, _certain(points, order), [places[k] for k in order], scales)
+
+
+def _asked(request: Request, points: Sequence[Point[Equilibrium]]) -> set[float]:
+    """Values of gamma that states were solved for [rad]."""
+    asked = {math.pi, request.gamma_max, -request.gamma_max}
+    if request.targets is not None:
+        return asked | set(request.targets)
+    most = math.ceil(max(abs(one.solution.parameter) for one in points) / EIGHTH)
+    return asked | {k * EIGHTH for k in range(-most, most + 1)}
+
+
+def _end(ring: GrippedRing, request: Request, *, max_steps: int) -> float | None:
+    """The gamma at which a path ends; None where it cannot be followed."""
+    options = replace(request.options, aimed_turn=LOOSE_TURN, max_steps=max_steps)
+    bare = replace(
+        request,
+        targets=(),
+        limits=False,
+        stability=False,
+        self_crossings=False,
+        options=options,
     )
+    try:
+        return [one.solution.parameter for one in bare.follow(ring)][-1]
+    except ContinuationFailed:
+        return None
+
+
+def _without_errors(
+    rings: Sequence[GrippedRing], points: Sequence[Point[Equilibrium]], end: float | None
+) -> ErrorBars:
+    """Error bars that say that the coarsest mesh leads to another ``end``."""
+    where = "cannot be followed to an end" if end is None else f"ends at gamma = {end:.6g}"
+    values = columns(rings[0], points)
+    how = (
+        f"null, and values not extrapolated: on {_edges(rings[-1])} edges the path {where}, so that"
+        " the meshes are not yet of one kind; use more edges"
+    )
+    raw = {name: column.tolist() for name, column in values.items()}
+    unknown: dict[str, object] = {name: [None] * len(points) for name in values}
+    return ErrorBars(tuple(points), values, raw, unknown | {"slope_at_pi": None, "how": how})
+
+
+def _certain(
+    points: Sequence[Point[Equilibrium]], order: Sequence[int]
+) -> list[Point[Equilibrium]]:
+    """Points in another order, without the index of those that have passed a singular one."""
+    place = {k: i for i, k in enumerate(order)}
+    singular = [k for k in place if points[k].kind in ("fold", "branch")]
+    # a point that lay on the other side of a singular one: the meshes do not agree on its index
+    passed = {k for k in place if any((place[s] < place[k]) != (s < k) for s in singular)}
+    return [replace(points[k], index=None, sides=None) if k in passed else points[k] for k in order]
+
+
+def _bars(
+    family: Family,
+    points: Sequence[Point[Equilibrium]],
+    places: Sequence[Place | None],
+    scales: Array,
+) -> ErrorBars:
+    """Values and errors of points at their places."""
+    corrections = _Corrections.of(places, scales)
+    bounds = [corrections.bound(k) for k in range(len(places))]
+    raw = columns(family.rings[0], points)
+    values = {
+        name: np.array(
+            [
+                own if p is None else float(p.values[c])
+                for own, p in zip(raw[name], places, strict=True)
+            ]
+        )
+        for c, name in enumerate(COLUMNS)
+    }
+    slope, slope_error = _slope_at_pi(places, points, corrections)
+    error: dict[str, object] = {
+        name: [None if b is None else float(b[c]) for b in bounds] for c, name in enumerate(COLUMNS)
+    }
+    error |= {"slope_at_pi": slope_error, "how": _how(family.rings, bounds)}
+    plain = {name: column.tolist() for name, column in raw.items()}
+    return ErrorBars(tuple(points), values, plain, error, slope)
 
 
 def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
@@ -138,7 +189,7 @@ def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
     return sorted(kept, key=lambda k: at[k])
 
 
-def _scales(family: Family, points: Sequence[Point]) -> Array:
+def _scales(family: Family, points: Sequence[Point[Equilibrium]]) -> Array:
     """What the columns of a table are measured in (6,): pi and the largest |M| and |U|."""
     values = np.array([family.values(0, point.solution) for point in points]).reshape(-1, RATE)
     largest = np.abs(values).max(axis=0, initial=0.0)
@@ -197,7 +248,7 @@ class _Corrections:
 
 
 def _slope_at_pi(
-    places: Sequence[Place | None], points: Sequence[Point], corrections: _Corrections
+    places: Sequence[Place | None], points: Sequence[Point[Equilibrium]], corrections: _Corrections
 ) -> tuple[float | None, float | None]:
     """dM/dgamma at the first arrival at pi, and its error."""
     found = [k for k, v in enumerate(points) if v.kind == "" and v.solution.parameter == math.pi]

@@ -1,42 +1,41 @@
-"""Folding a ring: from the scene to the record."""
+"""`der.fold`: from the scene to the record of its path."""
 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
-from functools import cache
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from der.analysis.self_crossing import gap, nearest_strands
-from der.continuation.arclength import follow
-from der.continuation.events import EIGHTH, Point, Wanted, full_index, three_covered
-from der.continuation.step import ContinuationFailed, Statistics
-from der.errors import STOPPED, Interrupted, NotConverged
-from der.geometry.mesh import sites
+from der.analysis.path_record import (
+    columns,
+    full_shapes,
+    path_record,
+    recorded_points,
+    state_at_pi,
+)
+from der.analysis.request import LOOSE_TURN, Request, ring_of
+from der.errors import Interrupted, NotConverged, Reason
 from der.geometry.ring import circle
 from der.geometry.section import section
-from der.kernels.assembly import assemble
 from der.kernels.quaternions import Array
-from der.records.configurations import Shapes
-from der.records.path import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode, release
-from der.rod.equilibrium import equilibrium
-from der.rod.gripped_ring import GrippedRing, free_ring, sector
-from der.rod.rod import State
-from der.rod.stability import all_modes, index
+from der.kernels.strands import gap, nearest_strands
+from der.problem import Options, Point, Statistics
+from der.records.path import AtPi, Mode, Path, folding_mode, release
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.scene import Scene, meshes
-from der.utils.checks import counts, shown
-from der.utils.interrupts import interrupts_between_states
+from der.utils.checks import shown
+from der.utils.run import Run
 
-_NO_MOMENT = 1e-6  # of the largest |M|: a state of rest
+if TYPE_CHECKING:
+    from der.analysis.error_bars import ErrorBars
+
+_NO_MOMENT = 1e-6  # of the largest |M|: a state without load
 _KEPT = 64  # configurations of a snap for N gradients; it takes about 5 N
-_STRIDE = (
-    5.0 / 3.0
-)  # where nothing is counted between states: on 280 rings as many folds and limits
-_BALANCED = 1e-6  # residual, of the largest bending moment, of a free ring at rest
 
 
 def fold(
@@ -45,7 +44,7 @@ def fold(
     progress: Callable[[float], object] | None = None,
     watch: Callable[[Array], object] | None = None,
 ) -> Path:
-    """The path of equilibria of a ring from flat (gamma = 0) on, with what is special on it.
+    """Return the path of equilibria of a ring from flat (gamma = 0) on, with its special points.
 
     Parameters
     ----------
@@ -67,155 +66,50 @@ def fold(
     """
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a der.Scene, got {shown(scene)}")
-    ring = _piece(scene, scene.n_edges, scene.sector)
+    ring, request, statistics = ring_of(scene), _request(scene), Statistics()
+
+    def tell(one: Point[Equilibrium]) -> None:
+        if progress is not None:
+            progress(one.solution.parameter)
+        if watch is not None:
+            watch(ring.vertices(one.solution.state))
+
+    with Run() as run:
+        run.prepare(lambda: _load_kernels(request, snaps=scene.control != "arclength"))
+        points = run.collect(_points(scene, ring, request, statistics), tell)
+        if run.done and points[-1].solution.parameter == -scene.gamma_max:
+            run.note(Reason.TURNED_BACK)
+        found = _Found(scene, ring, points)
+        if run.done and scene.error_bars:
+            found = run.attempt(partial(found.extrapolated, request)) or found
+        path = found.record(run, statistics)
+    if run.status == "interrupted":
+        raise Interrupted(run.marked(path))
+    if run.status == "not converged":
+        raise NotConverged(run.message, path)
+    return path
+
+
+def _request(scene: Scene) -> Request:
+    """What a scene asks for."""
     until_folded = scene.until == "folded"
-    beyond = scene.gamma_max > math.pi
-    counting = scene.stability or scene.looks_for_contacts
-    wanted = Wanted(
-        load_max=math.inf if until_folded and not beyond else scene.gamma_max,
+    counting = scene.stability or scene.looks_for_self_crossings
+    # who lists the states that are wanted, and nothing between them, is not slowed by others
+    turn = Options.aimed_turn if counting or scene.save_at is None else LOOSE_TURN
+    return Request(
+        gamma_max=math.inf if until_folded and scene.gamma_max <= math.pi else scene.gamma_max,
         until_folded=until_folded,
         targets=None if scene.save_at is None else tuple(scene.save_at),
-        # who lists the states that are wanted, and nothing between them, is not slowed by others
-        stride=1.0 if counting or scene.save_at is None else _STRIDE,
         stability=scene.stability,
-        contacts=scene.looks_for_contacts,
-        tolerance=scene.tolerance,
-    )
-    statistics = Statistics()
-    points: list[Point] = []
-    started = time.perf_counter()
-
-    def entries(status: str, message: str = "") -> dict[str, Any]:
-        timing = Timing(time.perf_counter() - started, statistics.newton_iterations, statistics.steps)
-        return _entries(scene, ring, points, timing, status, message)
-
-    with interrupts_between_states() as pressed:
-        try:
-            _load_kernels(wanted.stability, wanted.contacts, snaps=scene.control != "arclength")
-            started = time.perf_counter()
-            for point in _march(scene, ring, wanted, statistics):
-                points.append(point)
-                if progress is not None:
-                    progress(point.solution.parameter)
-                if watch is not None:
-                    watch(ring.vertices(point.solution.state))
-                if pressed:
-                    raise KeyboardInterrupt
-            message = NEVER if points[-1].solution.parameter == -scene.gamma_max else ""
-
-            def done() -> dict[str, Any]:
-                return entries("done", message)
-
-            bars = scene.error_bars
-            found = _with_error_bars(scene, ring, wanted, points, done) if bars else done()
-        except ContinuationFailed as stuck:
-            raise NotConverged(str(stuck), Path(**entries("not converged", str(stuck)))) from None
-        except KeyboardInterrupt:
-            pressed.clear()  # one more must not lose what there is
-            raise Interrupted(Path(**entries("interrupted", STOPPED))) from None
-        if pressed:  # while the record was made
-            raise Interrupted(Path(**found | {"status": "interrupted", "message": STOPPED}))
-    return Path(**found)
-
-
-def _piece(scene: Scene, n_edges: int, name: str) -> GrippedRing:
-    """A sector of the scene's ring with ``n_edges`` edges in the full ring."""
-    return gripped_ring(
-        scene.ring,
-        scene.section,
-        n_edges,
-        name=name,
-        measure=scene.curvature,
-        stretching=scene.stretching,
+        self_crossings=scene.looks_for_self_crossings,
+        options=Options(aimed_turn=turn, tolerance=scene.tolerance),
     )
 
 
-def _with_error_bars(
-    scene: Scene,
-    ring: GrippedRing,
-    wanted: Wanted,
-    points: list[Point],
-    entries: Callable[[], dict[str, Any]],
-) -> dict[str, Any]:
-    """The record's entries with the values extrapolated from three meshes, and their errors.
-
-    Indices, and the mode but for its slope, are those of the scene's own mesh, unknown where a
-    state passes a fold or branch point on its way to the extrapolated curve. Whether that reaches a
-    gamma asked for beside a fold is decided by the curve (`moved_folds`). Where the path of the
-    coarsest ends elsewhere, so are all values, and no error is known.
-    """
-    from der.analysis.error_bars import error_bars
-    from der.analysis.matching import Family
-    from der.analysis.moved_folds import all_asked
-
-    coarse = [_piece(scene, n, ring.name) for n in meshes(scene.n_edges, ring.name)[1:]]
-    end = _end(coarse[-1], replace(wanted, most_steps=4 * len(points) + 100))
-    if end != points[-1].solution.parameter:
-        return _without_errors(entries(), scene.n_edges // 4, end)
-    asked = {math.pi, scene.gamma_max, -scene.gamma_max}
-    if scene.save_at is not None:
-        asked |= set(scene.save_at)
-    else:
-        last = max(abs(point.solution.parameter) for point in points)
-        most = math.ceil(last / EIGHTH)
-        asked |= {k * EIGHTH for k in range(-most, most + 1)}
-    family = Family((ring, *coarse), scene.tolerance)
-    points[:] = all_asked(family, wanted, points, asked)
-    bars = error_bars(family.rings, points, asked, tolerance=scene.tolerance)
-    place = {k: i for i, k in enumerate(bars.order)}
-    singular = [k for k in place if points[k].kind in ("fold", "branch")]
-    for k, point in enumerate(points):
-        if k in place and any((place[s] < place[k]) != (s < k) for s in singular):
-            # it lay on the other side of a singular state: the meshes do not agree on its index
-            points[k] = replace(point, index=None, sides=None)
-    points[:] = [points[k] for k in bars.order]
-    found = entries()
-
-    def at(k: int) -> dict[str, float]:
-        return {name: float(getattr(bars, name)[k]) for name in ("gamma", "moment", "energy")}
-
-    at_pi, mode = found["at_pi"], found["mode"]
-    if at_pi is not None and mode is not None and bars.slope is not None:
-        now = at(bars.gamma.tolist().index(math.pi))
-        at_pi = replace(at_pi, moment=now["moment"], energy=now["energy"], slope=bars.slope)
-        mode = replace(mode, stable=bars.slope > 0.0 if mode.foldable else None)
-    return found | {
-        "gamma": bars.gamma,
-        "moment": bars.moment,
-        "energy": bars.energy,
-        "points": tuple(replace(point, **at(point.position)) for point in found["points"]),
-        "at_pi": at_pi,
-        "mode": mode,
-        "error": bars.error,
-        "raw": bars.raw,
-    }
-
-
-def _end(ring: GrippedRing, wanted: Wanted) -> float | None:
-    """The load at which a path ends; None where it cannot be followed."""
-    bare = replace(
-        wanted, targets=(), limits=False, stride=_STRIDE, stability=False, contacts=False
-    )
-    try:
-        return [point.solution.parameter for point in follow(ring, bare, Statistics())][-1]
-    except ContinuationFailed:
-        return None
-
-
-def _without_errors(found: dict[str, Any], n_edges: int, end: float | None) -> dict[str, Any]:
-    """A record's entries whose error bars say that ``n_edges`` edges lead to another ``end``."""
-    where = "cannot be followed to an end" if end is None else f"ends at gamma = {end:.6g}"
-    raw = {name: found[name].tolist() for name in ("gamma", "moment", "energy")}
-    how = (
-        f"null, and values not extrapolated: on {n_edges} edges the path {where}, so that the"
-        " meshes are not yet of one kind; use more edges"
-    )
-    unknown = {name: [None] * len(values) for name, values in raw.items()}
-    return found | {"error": unknown | {"slope_at_pi": None, "how": how}, "raw": raw}
-
-
-def _march(scene: Scene, ring: GrippedRing, wanted: Wanted, statistics: Statistics) -> Iterator[Point]:
-    """The states of the path, in the way in which the scene is controlled and solved.
+def _points(
+    scene: Scene, ring: GrippedRing, request: Request, statistics: Statistics
+) -> Iterator[Point[Equilibrium]]:
+    """The points of the path, in the way in which the scene is controlled and solved.
 
     What a scene does not need is not imported either.
     """
@@ -224,149 +118,111 @@ def _march(scene: Scene, ring: GrippedRing, wanted: Wanted, statistics: Statisti
         from der.analysis.loading_by_relaxation import follow_relaxed
 
         # no Hessian anywhere: neither index nor link is looked for between states
-        bare = replace(wanted, stability=False, contacts=False)
+        bare = replace(request, stability=False, self_crossings=False)
         return follow_relaxed(ring, bare, statistics, unload=scene.unload, every=every)
-    if scene.control == "angle":
-        from der.analysis.loading import follow_angle
+    if scene.control == "arclength":
+        return request.follow(ring, statistics)
+    from der.analysis.loading import follow_angle, follow_moment
 
-        return follow_angle(ring, wanted, statistics, unload=scene.unload, every=every)
-    if scene.control == "moment":
-        from der.analysis.loading import follow_moment
-
-        return follow_moment(ring, wanted, statistics, unload=scene.unload, every=every)
-    return follow(ring, wanted, statistics)
+    load = follow_angle if scene.control == "angle" else follow_moment
+    return load(ring, request, statistics, unload=scene.unload, every=every)
 
 
 @cache
-def _load_kernels(stability: bool, contacts: bool, *, snaps: bool) -> None:
-    """Load or compile the kernels that a path needs, once a process, before the clock starts."""
+def _compiled(stability: bool, self_crossings: bool, *, snaps: bool) -> None:
+    """Load or compile the kernels that a path needs, once a process."""
     ring = gripped_ring(circle(), section(1.0, 1.0), 8)
     if snaps:
         from der.rod.relaxation import relax
 
         relax(ring, ring.start)
-    for _ in follow(ring, Wanted(load_max=0.1, stability=stability, contacts=contacts), Statistics()):
+    request = Request(gamma_max=0.1, stability=stability, self_crossings=self_crossings)
+    for _ in request.follow(ring):
         pass
-    if contacts:
+    if self_crossings:
         x = ring.vertices(ring.start)
         gap(x, *nearest_strands(x, x))
 
 
-def _entries(
-    scene: Scene,
-    ring: GrippedRing,
-    points: list[Point],
-    timing: Timing,
-    status: str,
-    message: str,
-) -> dict[str, Any]:
-    """The entries of the record of what was visited."""
-    indices = [total_index(ring, point.index) for point in points]
-    moments = np.array([ring.moment(point.solution.moment) for point in points])
-    points = tuple(_points(ring, points))
-    at_pi = mode = None
-    for k, point in enumerate(points):
-        if point.solution.parameter == math.pi:
-            at_rest = abs(moments[k]) <= _NO_MOMENT * float(np.abs(moments).max())
-            free = _free_index(scene, ring, point) if at_rest and point.index else None
-            at_pi = AtPi(
-                float(moments[k]),
-                ring.moment(point.solution.slope),
-                ring.copies * point.solution.energy,
-                indices[k],
-                _moment_index(point, indices[k]),
-                free,
-            )
-            end = slice(0, k + 1)
-            before = tuple(point for point in points if point.position <= k)
-            gamma = np.array([v.solution.parameter for v in points[end]])
-            mode = folding_mode(
-                gamma, moments[end], before, at_pi, three_covered=three_covered(ring, point.solution)
-            )
-            break
-    if message == NEVER and at_pi is None:
-        mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
-    if scene.control == "moment":
-        mode = None  # a ring that fell through under its moment tells nothing of its folds in gamma
-    return {
-        "solver": "der",
-        "ring": scene.ring.to_json(),
-        "section": asdict(scene.section),
-        "numerics": _numerics(scene, ring),
-        "gamma": np.array([point.solution.parameter for point in points]),
-        "moment": moments,
-        "energy": np.array([ring.copies * point.solution.energy for point in points]),
-        "index": counts("index", indices),
-        "index_moment": counts("index_moment", list(map(_moment_index, points, indices))),
-        "points": points,
-        "at_pi": at_pi,
-        "mode": mode,
-        "error": None,
-        "timing": timing,
-        # an unfinished path keeps its shapes in any case: they are what it got to
-        "shapes": _shapes(scene, ring, points, status)
-        if scene.shapes or status != "done"
-        else None,
-        "status": status,
-        "message": message,
-    }
+def _load_kernels(request: Request, *, snaps: bool) -> None:
+    """Make ready what a request needs, before the clock starts."""
+    _compiled(request.stability, request.self_crossings, snaps=snaps)
 
 
-def _moment_index(point: Point, supports: int | None) -> int | None:
-    """Index with the moment supports: one more where dM/dgamma < 0; unknown where it vanishes."""
-    if held is None or point.kind == "limit":
-        return None
-    return held + (point.solution.slope < 0.0)
+@dataclass(frozen=True)
+class _Found:
+    """What was found of a path, and its error bars, where there are any."""
 
+    scene: Scene
+    ring: GrippedRing
+    points: list[Point[Equilibrium]]
+    bars: ErrorBars | None = None
 
-def _points(ring: GrippedRing, points: list[Point]) -> list[Point]:
-    """The special points, with the index on their two sides."""
-    points = []
-    for k, point in enumerate(points):
-        if not point.kind:
-            continue
-        before, after = (
-            total_index(ring, index) for index in point.sides or (point.index, point.index)
+    def extrapolated(self, request: Request) -> _Found:
+        """The same with error bars, and the points that these have kept."""
+        from der.analysis.error_bars import error_bars
+
+        coarser = meshes(self.scene.n_edges, self.ring.name)[1:]
+        rings = (self.ring, *(ring_of(self.scene, self.ring.name, n) for n in coarser))
+        bars = error_bars(rings, request, self.points)
+        return replace(self, points=list(bars.points), bars=bars)
+
+    def record(self, run: Run, statistics: Statistics) -> Path:
+        """The record."""
+        scene, bars = self.scene, self.bars
+        raw = columns(self.ring, self.points)
+        at_pi, mode = self._at_pi(raw)
+        if run.reason is Reason.TURNED_BACK and at_pi is None:
+            mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
+        if scene.control == "moment":
+            mode = None  # a ring that fell through under its moment tells nothing of its folds
+        keeps = scene.shapes or run.status != "done"  # an unfinished path is what it got to
+        modes = scene.modes and run.status != "interrupted"  # Ctrl-C does not wait for them
+        entries: dict[str, Any] = {"at_pi": at_pi, "mode": mode}
+        if bars is not None:
+            entries = {"error": bars.error, "raw": bars.raw, **bars.at_pi(at_pi, mode)}
+        return path_record(
+            scene,
+            self.ring,
+            self.points,
+            run,
+            statistics,
+            numerics=_numerics(scene, self.ring),
+            values=raw if bars is None else bars.values,
+            shapes=full_shapes(scene, self.ring, self.points, modes=modes) if keeps else None,
+            **entries,
         )
-        at = point.solution
-        numbers = (at.state.load, ring.moment(at.moment), ring.copies * at.energy)
-        points.append(Point(point.kind, *numbers, before, after, k, point.details))
-    return points
 
+    def _at_pi(self, raw: dict[str, Array]) -> tuple[AtPi | None, Mode | None]:
+        """The state at the first arrival at pi, and how the ring folds, on the scene's mesh."""
+        arrived = (k for k, one in enumerate(self.points) if one.solution.parameter == math.pi)
+        k = next(arrived, None)
+        if k is None:
+            return None, None
+        one = self.points[k]
+        largest = float(np.abs(raw["moment"]).max())
+        without_load = abs(raw["moment"][k]) <= _NO_MOMENT * largest
+        at_pi = state_at_pi(
+            self.ring, one, self._index_free(one) if without_load and one.index else None
+        )
+        before = recorded_points(self.ring, self.points[: k + 1], raw)
+        mode = folding_mode(
+            raw["gamma"][: k + 1],
+            raw["moment"][: k + 1],
+            before,
+            at_pi,
+            three_covered=self.ring.folded(one.solution.state),
+        )
+        return at_pi, mode
 
-def _free_index(scene: Scene, ring: GrippedRing, point: Point) -> int | None:
-    """Index of the ring with its grips removed, rigid motions taken out, if it stays at rest."""
-    whole = _piece(scene, scene.n_edges, "full")
-    supports = free_ring(whole.rod)
-    quat = ring.full_frames(point.solution.state)
-    stretch = ring.full_lengths(point.solution.state) / whole.rod.length - 1.0
-    state = State(quat, stretch, np.zeros(3), 0.0)
-    system = assemble(whole.rod, supports, quat, stretch, state.force, 0.0)
-    free = supports.free.reshape(-1)
-    residual = system.grad.reshape(-1)[free]
-    border = system.border.reshape(-1, 3)[free]
-    force = -np.linalg.lstsq(border, residual, rcond=None)[0]
-    scale = float(np.abs(system.diag).max() * whole.rod.cell.max())
-    if float(np.abs(residual + border @ force).max()) > _BALANCED * scale:
-        if not scene.stretching:
-            return None
-        # a grip holds the length of its edge, too: without it the ring settles a little
-        settled = equilibrium(whole.rod, supports, state.but(force=force), tolerance=scene.tolerance)
-        if not settled.converged:
-            return None
-        state, force = settled.state, settled.state.force
-    return index(whole.rod, supports, all_modes(supports), state.but(force=force))
+    def _index_free(self, one: Point[Equilibrium]) -> int | None:
+        """Index of the ring with its grips removed."""
+        from der.rod.free_ring import index_without_grips
 
-
-def _shapes(scene: Scene, ring: GrippedRing, points: list[Point], status: str) -> Shapes | None:
-    """The full ring at every state, if there is any, and what else was asked to be kept of it."""
-    if not points:
-        return None
-    from der.analysis.full_ring import shapes
-
-    modes = scene.modes and status != "interrupted"  # who pressed Ctrl-C does not wait for them
-    arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
-    return shapes(ring, points, arc_length, history=scene.history, modes=modes)
+        full = ring_of(self.scene, "full")
+        return index_without_grips(
+            self.ring, full, one.solution.state, tolerance=self.scene.tolerance
+        )
 
 
 def _numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from der.continuation.events import Point
 from der.kernels.linking import unfold_lengths
 from der.kernels.quaternions import Array, rotation
+from der.problem import Point
 from der.records.configurations import Fall, Shapes, Softest
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
-from der.rod.stability import softest_modes
 
 if TYPE_CHECKING:
     from der.analysis.snap import Landing
@@ -26,7 +26,12 @@ _HALF_TURNS = np.array([[-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 
 
 def shapes(
-    ring: GrippedRing, points: Sequence[Point], arc_length: Array, *, history: bool, modes: bool
+    ring: GrippedRing,
+    points: Sequence[Point[Equilibrium]],
+    arc_length: Array,
+    *,
+    history: bool,
+    modes: bool,
 ) -> Shapes:
     """Vertices and frames at every state, with how the ring falls and its softest modes if asked.
 
@@ -49,7 +54,7 @@ def _whole(ring: GrippedRing, states: Sequence[State]) -> tuple[Array, Array]:
     return np.array([x for x, _ in pairs]), np.array([frames for _, frames in pairs])
 
 
-def _falls(ring: GrippedRing, points: Sequence[Point]) -> list[Fall]:
+def _falls(ring: GrippedRing, points: Sequence[Point[Equilibrium]]) -> list[Fall]:
     """How the ring falls in the snaps among the points."""
     from der.analysis.snap import Landing
 
@@ -80,9 +85,8 @@ def _softest(ring: GrippedRing, states: Sequence[State]) -> Softest:
     u: list[Array] = []
     for k, state in enumerate(states):
         found = {}
-        for c, (label, (_, modes)) in enumerate(ring.classes.items()):
-            eigenvalues[k, c : c + 1], (mode,) = softest_modes(ring.rod, ring.supports, modes, state)
-            found[label] = mode
+        for c, label in enumerate(ring.classes):
+            eigenvalues[k, c : c + 1], (found[label],) = ring.softest_modes(state, symmetry=label)
         label = list(found)[int(np.argmin(eigenvalues[k]))]
         moved = displacements(ring, state, label, found[label])
         u.append(-moved if u and np.vdot(moved, u[-1]) < 0.0 else moved)

@@ -86,7 +86,7 @@ def follow_moment(
     at = down.begun(last)
     if at.slope < 0.0:
         # M grows as gamma falls: no dead moment holds the ring once it is off the stop
-        landed = down.snapped(at, at.tangent, sense=-1.0)
+        landed = down.snapped(at, at.tangent, sense=-1.0, dead_moment=True)
         yield landed
         down.check_other_classes(landed)
         if landed.solution.parameter == 0.0:

@@ -1,4 +1,4 @@
-"""Marching by dynamic relaxation alone: no Hessian, no factorisation, only forces.
+"""Loading by dynamic relaxation alone: no Hessian, no factorisation, only forces.
 
 The grips turn in steps, and after each the ring comes to rest from where the last states lead. A
 state that rests elsewhere has snapped, and so has one whose energy is not that of the last and the
@@ -11,13 +11,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from der.analysis.request import EIGHTH, Request
+from der.analysis.secant import CLOSE, ahead, is_work, longer, rested, went_on
 from der.analysis.snap import Landing
-from der.analysis.trail import CLOSE, ahead, is_work, longer, rested, went_on
-from der.continuation.events import Point, Wanted
-from der.continuation.interpolant import between
-from der.continuation.step import ContinuationFailed, Statistics
+from der.errors import ContinuationFailed, Reason
+from der.problem import Point, Statistics
 from der.rod import relaxation
-from der.rod.equilibrium import Direction, Equilibrium, moved
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed, relax
 from der.rod.rod import State
@@ -30,7 +30,7 @@ _NARROW = 0.01  # of the way between two states, a parabola through a limit of M
 
 def follow_relaxed(
     ring: GrippedRing,
-    wanted: Wanted,
+    request: Request,
     statistics: Statistics,
     *,
     start: Equilibrium | None = None,
@@ -38,7 +38,7 @@ def follow_relaxed(
     rise: float = RISE,
     tolerance: float = 1e-9,
     every: int = 0,
-) -> Iterator[Point]:
+) -> Iterator[Point[Equilibrium]]:
     """Hand out the minima at given gamma, each by dynamic relaxation: no Hessian anywhere.
 
     Gamma goes in steps of ``rise`` [rad] and through every load that is asked for. Limits of the
@@ -52,13 +52,13 @@ def follow_relaxed(
     ContinuationFailed
         Where a state does not come to rest.
     """
-    walk = _Walk(ring, wanted, statistics, rise, tolerance, every)
+    walk = _Walk(ring, request, statistics, rise, tolerance, every)
     last = start
     for one in _with_limits(walk, _relaxed_states(walk, start)):
         last = one.solution
         yield one
     if unload:
-        back = replace(walk, wanted=replace(wanted, load_max=0.0))
+        back = replace(walk, request=replace(request, gamma_max=0.0))
         states = _with_limits(back, _relaxed_states(back, last))
         next(states)  # the state at which loading has ended
         yield from states
@@ -69,7 +69,7 @@ class _Walk:
     """What the states of one march by relaxation share."""
 
     ring: GrippedRing
-    wanted: Wanted
+    request: Request
     statistics: Statistics
     rise: float
     tolerance: float
@@ -83,28 +83,30 @@ class _Walk:
         ContinuationFailed
             Where there is none.
         """
-        found = relax(self.ring, start, tolerance=self.tolerance, every=every
-        )
+        found = relax(self.ring, start, tolerance=self.tolerance, every=every)
         self.statistics.force_evaluations += found.evaluations
         if not found.rests:
             where = f"vertex {found.where} " if found.where >= 0 else ""
             raise ContinuationFailed(
-                f"at gamma = {start.load:.8f} the ring {where}{relaxation.found.advice}"
+                f"at gamma = {start.load:.8f} the ring {where}{relaxation.ADVICE[found.outcome]}",
+                Reason.NOT_AT_REST,
             )
         return found
 
     def loads(self, first: float) -> list[float]:
         """Loads to relax at, in the order of the march from ``first``."""
-        last = self.wanted.load_max
+        last = self.request.gamma_max
         low, high = min(first, last), max(first, last)
-        if high - low > self.wanted.most_steps * self.rise:
-            raise ContinuationFailed(f"the march would not end within {self.wanted.most_steps} steps")
+        if high - low > self.request.options.max_steps * self.rise:
+            most = self.request.options.max_steps
+            raise ContinuationFailed(
+                f"loading would not end within {most} steps", Reason.TOO_MANY_STEPS
+            )
         grid = [k * self.rise for k in range(math.ceil(low / self.rise), int(high / self.rise) + 1)]
-        asked = self.wanted.targets
+        asked = self.request.targets
         if asked is None:
-            eighth = math.pi / 8.0
             asked = tuple(
-                k * eighth for k in range(math.ceil(low / eighth), int(high / eighth) + 1)
+                k * EIGHTH for k in range(math.ceil(low / EIGHTH), int(high / EIGHTH) + 1)
             )
         asked = (*(load for load in (*asked, math.pi) if low <= load <= high), last)
         # a step of the grid that all but meets a load that is asked for is left out
@@ -113,7 +115,7 @@ class _Walk:
         return sorted({*grid, *asked} - {first}, reverse=last < first)
 
 
-def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Point]:
+def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Point[Equilibrium]]:
     """Relaxed states at the loads of a march, with landings where the ring has snapped."""
     ring = walk.ring
     first = walk.relaxed(ring.start if start is None else start.state)
@@ -122,9 +124,9 @@ def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Point]:
     largest = 0.0  # moment so far
     loads = walk.loads(first.state.load)[::-1]
     while loads:
-        here = trail[-1].state.load
+        here = trail[-1].parameter
         if len(trail) > 1:
-            longest = _LONGER * (here - trail[-2].state.load)
+            longest = _LONGER * (here - trail[-2].parameter)
             if abs(loads[-1] - here) > abs(longest):
                 loads.append(here + 0.5 * longest)
         found = walk.relaxed(ahead(ring, trail, loads[-1]))
@@ -147,7 +149,7 @@ def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
     """The state that a ring has snapped to between the last state of a trail and ``load``."""
     ring, before = walk.ring, trail[-1]
     found = walk.relaxed(ahead(ring, trail, load), walk.every)
-    rise = load - before.state.load
+    rise = load - before.parameter
     energy = ring.copies * (before.energy + before.moment * rise)
     details: dict[str, object] = {
         "gamma_fold": load,
@@ -155,8 +157,8 @@ def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
         "energy_before": energy,
         "energy_after": ring.copies * found.energy,
         "energy_released": energy - ring.copies * found.energy,
-        "moment_before": ring.moment(before.moment),
-        "moment_after": ring.moment(found.moment),
+        "moment_before": ring.arm_moment(before.moment),
+        "moment_after": ring.arm_moment(found.moment),
         "force_evaluations": found.evaluations,
     }
     energies = tuple(ring.copies * float(e) for e in found.energies)
@@ -164,9 +166,9 @@ def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
     return Landing(at, "snap", details=details, history=found.history, energies=energies)
 
 
-def _with_limits(walk: _Walk, states: Iterator[Point]) -> Iterator[Point]:
+def _with_limits(walk: _Walk, states: Iterator[Point[Equilibrium]]) -> Iterator[Point[Equilibrium]]:
     """The points with the limits of the moment put in, each state a step late."""
-    window: list[list[Point]] = []  # each with those that are all but the same state
+    window: list[list[Point[Equilibrium]]] = []  # each with those that are all but the same state
     for one in states:
         if one.kind == "snap":
             for same in window[1:]:
@@ -184,13 +186,15 @@ def _with_limits(walk: _Walk, states: Iterator[Point]) -> Iterator[Point]:
         turn = list(window[1])
         if (b.moment - a.moment) * (c.moment - b.moment) < 0.0:
             turn.append(_turning(walk, a, b, c))
-        yield from sorted(turn, key=lambda v: v.solution.parameter, reverse=c.state.load < b.state.load)
+        yield from sorted(
+            turn, key=lambda v: v.solution.parameter, reverse=c.parameter < b.parameter
+        )
         window.pop(0)
     for same in window[1:]:
         yield from same
 
 
-def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Point:
+def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Point[Equilibrium]:
     """The limit of the moment among three relaxed states: bracketed (Brent), then by a parabola.
 
     All of their states lie between the three: a little beyond, there may be a snap. Towards a fold
@@ -198,7 +202,7 @@ def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Poi
     """
     from scipy.optimize import minimize_scalar
 
-    low, high = sorted((a.state.load, c.state.load))
+    low, high = sorted((a.parameter, c.parameter))
     h = _NARROW * (high - low)
     sign = 1.0 if b.moment < a.moment else -1.0
 
@@ -213,7 +217,7 @@ def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Poi
 
 def _vertex(trail: list[Equilibrium]) -> float:
     """Load at which a parabola through three moments is stationary."""
-    x, y, z = (at.state.load for at in trail)
+    x, y, z = (at.parameter for at in trail)
     p, q, r = (at.moment for at in trail)
     first, second = (q - p) / (y - x), (r - q) / (z - y)
     return y if first == second else 0.5 * (x + y) - 0.5 * first * (z - x) / (second - first)
@@ -221,8 +225,9 @@ def _vertex(trail: list[Equilibrium]) -> float:
 
 def _between(walk: _Walk, a: Equilibrium, c: Equilibrium, load: float) -> Equilibrium:
     """The relaxed state at a load between those of two others."""
-    part = (load - a.state.load) / (c.state.load - a.state.load)
+    part = (load - a.parameter) / (c.parameter - a.parameter)
     step = walk.ring.difference(a.state, c.state)
-    guess = Direction(part * step.q, 0.0 * step.force, load - a.state.load)
+    guess = walk.ring.displacement(step, part)
+    guess[-1] = load - a.parameter
     found = walk.relaxed(walk.ring.retract(a.state, guess).but(load=load))
     return rested(walk.ring, [a], found)

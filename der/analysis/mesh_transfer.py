@@ -1,31 +1,37 @@
-"""The states of two coarser meshes that belong to one on the finest.
+"""Transfer of equilibria to coarser meshes, for Richardson extrapolation.
 
-Frames sit on the same material points at every resolution, so every second frame of a state is
-nearly a state on half the edges. What is missing is called its *offset*. Offsets change little from
-one state of a path to the next, and are about four times as large from mesh to mesh: where bare
-frames are too far from their state, Newton's method starts from the offset expected.
+Error bars compare the same equilibrium on N, N/2 and N/4 edges. The meshes are nested: every second
+frame of the fine mesh is a frame of the coarse one. A fine equilibrium, restricted, is a good
+initial guess on the coarse mesh, and Newton's method finishes it in the plane normal to the path,
+so that the states correspond.
+
+If the restricted guess is too far away, Newton's method starts from an extrapolated correction
+instead: the correction of the previous state on the path, or four times that of the next finer
+mesh, because the discretisation is second order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from der.continuation.interpolant import between
 from der.kernels.quaternions import Array
-from der.rod.equilibrium import Control, Direction, Equilibrium, dot, equilibrium, moved
+from der.problem import PLANE, Increment
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
+from der.rod.manifold import Direction, split
 from der.rod.rod import State
 
 
 class Level(NamedTuple):
     """The state of a coarser mesh that belongs to one on a mesh of twice the edges."""
 
-    at: Equilibrium
-    offset: Direction  # what leads to it from every second frame
+    solution: Equilibrium
+    correction: Direction  # what leads to it from every second frame
     speed: float  # lengths along its own tangent, per length of the path of the finest mesh
     beyond: float  # how far beyond the plane it lies, along that path
 
@@ -57,84 +63,86 @@ def restricted(
         None where a level has no such state.
     """
     finest, on_half, on_quarter = rings
-    q, load = fine.tangent.q, fine.parameter_rate
-    advance = dot(finest.rod, _normal(finest, q, load), fine.tangent)
-    q = np.ascontiguousarray(q[::2])
-    given = None if near is None else near.half.offset
-    half = _level(on_half, fine.state, q, load, lambda: given, advance, 0.0, tolerance)
+    q, _, load = split(finest.supports, fine.tangent)
+    advance = finest.inner(_normal(finest, q, load), fine.tangent)
+    plane = _Plane(np.ascontiguousarray(q[::2]), load, advance, tolerance)
+    given = None if near is None else near.half.correction
+    half = plane.level(on_half, fine.state, lambda: given, 0.0)
     if half is None:
         return None
-    expected = partial(_twice_as_coarse, on_quarter, half.offset, near)
-    q = np.ascontiguousarray(q[::2])
-    quarter = _level(on_quarter, half.solution.state, q, load, expected, advance, half.beyond, tolerance)
+    plane = replace(plane, q=np.ascontiguousarray(plane.q[::2]))
+    expected = partial(_twice_as_coarse, on_quarter, half.correction, near)
+    quarter = plane.level(on_quarter, half.solution.state, expected, half.beyond)
     return None if quarter is None else Restricted(half, quarter)
 
 
 def _twice_as_coarse(ring: GrippedRing, finer: Direction, near: Restricted | None) -> Direction:
-    """The offset expected on the coarsest mesh, ``ring``, where ``finer`` is that before it."""
+    """The correction expected on the coarsest mesh, ``ring``; ``finer``: that before it."""
     # second order: four times that of the finer mesh; and what that was short of nearby
-    offset = _coarser(finer, 4.0)
+    correction = _coarser(finer, 4.0)
     if near is not None:
-        less = _coarser(near.half.offset, 4.0)
-        offset = _sum(_sum(offset, near.quarter.offset, 1.0), less, -1.0)
-    offset.q[~ring.supports.free] = 0.0
-    return offset
+        less = _coarser(near.half.correction, 4.0)
+        correction = _sum(_sum(correction, near.quarter.correction, 1.0), less, -1.0)
+    correction.q[~ring.supports.free] = 0.0
+    return correction
 
 
-def _level(
-    ring: GrippedRing,
-    finer: State,
-    q: Array,
-    load: float,
-    expected: Callable[[], Direction | None],
-    advance: float,
-    beyond: float,
-    tolerance: float,
-) -> Level | None:
-    """The state of ``ring`` in the plane normal to rates ``q`` (n, b) and ``load``.
+@dataclass(frozen=True)
+class _Plane:
+    """The plane normal to the path of the finest mesh, as a coarser mesh sees it."""
 
-    Tried from bare frames, then from the offset ``expected``, which may lead beside the plane and
-    is not worked out before it is needed. ``beyond`` is that of the finer mesh.
-    """
-    own = State(
-        np.ascontiguousarray(finer.quat[::2]),
-        np.ascontiguousarray(finer.stretch[::2]),
-        finer.force,
-        finer.load,
-    )
-    row = _normal(ring, q, load)
-    for start in _starts(ring, own, row, load, expected):
-        at = ring.correct(start,
-            along=row,
-            hold=PLANE,
-            tolerance=tolerance,
+    q: Array  # (n, b) rates of the frames along the path
+    load: float  # and of gamma
+    advance: float  # product of the path's tangent with its own normal
+    tolerance: float  # of the residual, GJ/a
+
+    def level(
+        self,
+        ring: GrippedRing,
+        finer: State,
+        expected: Callable[[], Direction | None],
+        beyond: float,
+    ) -> Level | None:
+        """The state of ``ring`` in the plane; None: there is none.
+
+        Tried from bare frames, then from the correction ``expected``, which may lead beside the
+        plane and is not worked out before it is needed. ``beyond`` is that of the finer mesh.
+        """
+        own = State(
+            np.ascontiguousarray(finer.quat[::2]),
+            np.ascontiguousarray(finer.stretch[::2]),
+            finer.force,
+            finer.load,
         )
-        if at.converged and (speed := ring.inner(row, at.tangent)) != 0.0:
-            break
-    else:
-        return None
-    offset = ring.difference(own, at.state)
-    # corrections are orthogonal one by one, and rotations do not commute: a state lies beside the
-    # plane to the second order of its offset, by as much as its start would have it
-    beyond += ring.inner(row, offset) / advance
-    return Level(at, offset, advance / speed, beyond)
+        row = _normal(ring, self.q, self.load)
+        for start in self._starts(ring, own, expected):
+            at = ring.correct(start, along=row, hold=PLANE, tolerance=self.tolerance)
+            if at.converged and (speed := ring.inner(row, at.tangent)) != 0.0:
+                break
+        else:
+            return None
+        away = ring.difference(own, at.state)
+        # corrections are orthogonal one by one, and rotations do not commute: a state lies beside
+        # the plane to the second order of its correction, by as much as its start would have it
+        beyond += ring.inner(row, away) / self.advance
+        return Level(at, split(ring.supports, away), self.advance / speed, beyond)
+
+    def _starts(
+        self, ring: GrippedRing, own: State, expected: Callable[[], Direction | None]
+    ) -> Iterator[State]:
+        """Where Newton's method starts: bare frames, then these moved by the correction."""
+        yield own
+        correction = expected()
+        if correction is not None:
+            row = _normal(ring, self.q, self.load)
+            rates = ring.increment(self.q, self.load)
+            # corrections of another state may lie beside this plane by a little
+            away = ring.inner(row, correction.flat) / ring.inner(row, rates)
+            yield ring.retract(own, correction.flat - away * rates)
 
 
-def _starts(
-    ring: GrippedRing, own: State, row: Direction, load: float, expected: Callable[[], Direction | None]
-) -> Iterator[State]:
-    """Where Newton's method starts: bare frames, then these moved by the offset ``expected``."""
-    yield own
-    offset = expected()
-    if offset is not None:
-        rates = row._replace(load=load)
-        # offsets of another state may lie beside this plane by a little
-        away = ring.inner(row, offset) / ring.inner(row, rates)
-        yield ring.retract(own, _sum(offset, rates, -away))
-
-
-def _normal(ring: GrippedRing, q: Array, load: float) -> Direction:
-    """The direction of rates ``q`` (n, b) of the frames and ``load`` of gamma, as a normal.
+def _normal(ring: GrippedRing, q: Array, load: float) -> Increment:
+    """The direction of rates ``q`` (n, b) of the frames and ``load`` of gamma, as a normal (m,).
 
     Notes
     -----
@@ -142,12 +150,14 @@ def _normal(ring: GrippedRing, q: Array, load: float) -> Direction:
     both rotations, the grips' included: they turn with gamma and are no entries of q. Without them
     an end of the integral would be missing, and the series in h would have odd powers.
     """
-    return Direction(q, np.zeros(len(ring.supports.target)), ring.turning * load)
+    return ring.increment(q, ring.turning * load)
 
 
-def _coarser(offset: Direction, factor: float) -> Direction:
-    """Every second of an offset, times a factor."""
-    return Direction(factor * offset.q[::2], factor * offset.force, factor * offset.load)
+def _coarser(correction: Direction, factor: float) -> Direction:
+    """Every second entry of a correction, times a factor."""
+    return Direction(
+        factor * correction.q[::2], factor * correction.force, factor * correction.load
+    )
 
 
 def _sum(a: Direction, b: Direction, factor: float) -> Direction:

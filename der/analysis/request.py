@@ -16,6 +16,9 @@ from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.rod.rod import State
 from der.scene import Scene
 
+# rad between tangents, where nothing is counted between states: on 280 rings as many folds and
+# limits as with the usual
+LOOSE_TURN = 5.0 / 3.0 * Options.aimed_turn
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
 
 

@@ -81,9 +81,7 @@ class SelfCrossing:
             inside = [(s, self.ring.link(step.near(s)))]
         else:
             sides = passed - _SIDE * _CONTACT, passed + _SIDE * _CONTACT
-            inside = [
-                (s, self.ring.link(step.at(s).state)) for s in sides if low[0] < s < high[0]
-            ]
+            inside = [(s, self.ring.link(step.at(s).state)) for s in sides if low[0] < s < high[0]]
         # what changes beside a crossing that was looked at is bisected: it was none, or not the
         # only one
         return [

@@ -98,7 +98,9 @@ class _Snap:
             return fall
         where = f"vertex {fall.where} " if fall.where >= 0 else ""
         advice = relaxation.ADVICE[fall.outcome]
-        raise ContinuationFailed(f"{self.name} came to no rest: {where}{advice}", Reason.NOT_AT_REST)
+        raise ContinuationFailed(
+            f"{self.name} came to no rest: {where}{advice}", Reason.NOT_AT_REST
+        )
 
     def polished(self, state: State, moment: float | None) -> Equilibrium:
         """The equilibrium next to a state that is nearly at rest."""
@@ -227,7 +229,10 @@ def _settled(
         elif not after.converged:
             tolerance, reason = 1e-3 * tolerance, after.advice
         elif (
-            own == 0 and moment is None and pressing is not None and snapping.overruns(after, pressing)
+            own == 0
+            and moment is None
+            and pressing is not None
+            and snapping.overruns(after, pressing)
         ):
             # the stop was only overrun: the ring comes back from it, to where the moment holds it
             near = snapping.polished(after.state, pressing)

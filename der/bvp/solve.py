@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cache
 
 import numpy as np
@@ -14,12 +14,12 @@ from der.bvp.collocation import Collocation, Solution, collocation
 from der.bvp.continuation import Stuck, Tally, Visit, Wanted, follow
 from der.bvp.full_ring import full_ring, turning
 from der.bvp.sectors import sector
-from der.errors import STOPPED, Interrupted, NotConverged
+from der.errors import STOPPED, Interrupted, NotConverged, Reason
 from der.geometry.mesh import sites
 from der.geometry.ring import circle
 from der.geometry.section import section
 from der.records.configurations import Shapes
-from der.records.path import NEVER, AtPi, Mode, Path, Point, Timing, folding_mode, release
+from der.records.path import AtPi, Mode, Path, Point, Timing, folding_mode, release
 from der.scene import Scene
 from der.utils.checks import checked_number, counts
 from der.utils.interrupts import interrupts_between_states
@@ -34,7 +34,7 @@ HOW = (
 )
 
 
-def solve(
+def solve_bvp(
     scene: Scene,
     *,
     tolerance: float = TOLERANCE,
@@ -74,7 +74,7 @@ def solve_visits(
     tolerance: float = TOLERANCE,
     progress: Callable[[float], object] | None = None,
 ) -> tuple[Path, list[Visit]]:
-    """`solve`, and the solutions themselves."""
+    """`solve_bvp`, and the solutions themselves."""
     check(scene, tolerance)
     system = collocation(sector(scene))
     until_folded = scene.until == "folded"
@@ -88,9 +88,9 @@ def solve_visits(
     tally = Tally()
     visits: list[Visit] = []
 
-    def record(status: str, message: str = "") -> Path:
+    def record(status: str, message: str = "", reason: str = "") -> Path:
         timing = Timing(time.perf_counter() - started, tally.newton_iterations, tally.steps)
-        return _record(scene, system, tolerance, visits, timing, status, message)
+        return _record(scene, system, tolerance, visits, timing, status, message, reason)
 
     with interrupts_between_states() as pressed:
         _load_kernels(system.sector.piece.quarter)
@@ -106,10 +106,11 @@ def solve_visits(
             raise NotConverged(str(stuck), record("not converged", str(stuck))) from None
         except KeyboardInterrupt:
             pressed.clear()  # one more must not lose what there is
-            raise Interrupted(record("interrupted", STOPPED)) from None
-        path = record("done", NEVER if visits[-1].at.gamma == -scene.gamma_max else "")
+            raise Interrupted(record("interrupted", STOPPED, Reason.INTERRUPTED.word)) from None
+        back = (Reason.TURNED_BACK.value, Reason.TURNED_BACK.word)
+        path = record("done", *(back if visits[-1].at.gamma == -scene.gamma_max else ()))
         if pressed:  # while the record was made
-            raise Interrupted(replace(path, status="interrupted", message=STOPPED))
+            raise Interrupted(path.interrupted())
     return path, visits
 
 
@@ -155,6 +156,7 @@ def _record(
     timing: Timing,
     status: str,
     message: str,
+    reason: str,
 ) -> Path:
     """The record of what was visited."""
     moments = np.array([visit.at.moment for visit in visits])
@@ -175,7 +177,7 @@ def _record(
                 gamma[: k + 1], moments[: k + 1], before, at_pi, three_covered=covered
             )
             break
-    if message == NEVER and float(gamma.max()) < math.pi:
+    if reason == Reason.TURNED_BACK.word and float(gamma.max()) < math.pi:
         mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
     unknown = counts("index", [None] * len(visits))
     error = {
@@ -210,6 +212,7 @@ def _record(
         shapes=_shapes(scene, system, visits) if scene.shapes and visits else None,
         status=status,
         message=message,
+        reason=reason,
     )
 
 

@@ -133,7 +133,7 @@ def fold(ring: RingOptions, path: PathOptions, files: FileOptions, watch: LiveOp
 def bvp(ring: RingOptions, path: PathOptions, files: FileOptions) -> int:
     """Solve the boundary-value problem: the same path, to the error that you ask for."""
     with options_named():
-        from der.bvp.solve import TOLERANCE, check, solve
+        from der.bvp.solve import TOLERANCE, check, solve_bvp
 
         tolerance = TOLERANCE if path.tolerance is None else path.tolerance
         scene = path.scene(ring, shapes=files.drawn, error_bars=False, tolerance=1e-10)
@@ -142,7 +142,7 @@ def bvp(ring: RingOptions, path: PathOptions, files: FileOptions) -> int:
         other = files.other()
 
     def run(tick: Callable[[float], object] | None) -> Path:
-        return solve(scene, tolerance=tolerance, progress=tick)
+        return solve_bvp(scene, tolerance=tolerance, progress=tick)
 
     return follow(run, scene, written, other, quiet=files.quiet)[1]
 
@@ -273,17 +273,17 @@ def landscape(ring: RingOptions, path: PathOptions, wanted: LandscapeOptions) ->
         found: Any
         with progress(scene, quiet=wanted.quiet) as tick:
             if wanted.two_dimensional:
-                from der.analysis.landscape.surface import surface
+                from der.analysis.landscape.surface import energy_surface
 
-                found = surface(scene, shape=(wanted.cells, wanted.cells), progress=tick)
+                found = energy_surface(scene, shape=(wanted.cells, wanted.cells), progress=tick)
             elif wanted.push:
                 from der.analysis.landscape.opening import least_push
 
                 found = least_push(scene, progress=tick)
             elif wanted.free:
-                from der.analysis.landscape.barrier import free_barrier
+                from der.analysis.landscape.barrier import barrier
 
-                found = free_barrier(scene)
+                found = barrier(scene)
             else:
                 found = curve(scene, progress=tick)
     from der.cli.drawings import of_landscape

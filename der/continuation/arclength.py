@@ -127,9 +127,7 @@ class _Path(Generic[S]):
             if end.converged:
                 reason = Reason.TOO_SHARP
                 if self._angle(start, end) < options.sharpest_turn:
-                    step = Step(
-                        self.system, start, end, length, options.tolerance, self.statistics
-                    )
+                    step = Step(self.system, start, end, length, options.tolerance, self.statistics)
                     if _orientation(start) == _orientation(end) or step.bulge < _STRAIGHT:
                         return step
                     reason = Reason.OTHER_BRANCH

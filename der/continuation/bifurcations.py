@@ -87,7 +87,9 @@ class Counting:
         wider = _jump(first, last) == _jump(low, high)
         return search(first, last) if wider else search(low, high)
 
-    def between_equals(self, low: Place, high: Place, stiffness: tuple[float, float]) -> list[Place]:
+    def between_equals(
+        self, low: Place, high: Place, stiffness: tuple[float, float]
+    ) -> list[Place]:
         """A place between two of equal index where the class has another, if there is one.
 
         Two changes of opposite sense within a step show at its ends only by a soft mode

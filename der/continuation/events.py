@@ -93,7 +93,7 @@ def _stable(system: System[S]) -> Stability[S]:
 def located(
     system: System[S], events: Events[S], step: Step[S], here: Point[Any]
 ) -> tuple[list[Point[Any]], bool]:
-    """Return the points after ``here`` up to the end of ``step``, and whether the path ends there."""
+    """Return the points after ``here`` in ``step``, and whether the path ends with them."""
     folds = _folds(step)
     marks, ended = _at_targets(system, events, step, folds)
     if not ended:
@@ -216,16 +216,12 @@ class _Stability:
                 stiffness = a.point.stiffness[c], b.point.stiffness[c]
                 places[1:1] = counting.between_equals(low, high, stiffness)
             changes = [one for ends in pairwise(places) for one in counting.changes(*ends)]
-            found += [
-                replace(one, fold=c == 0 and is_fold(self.step, one.s)) for one in changes
-            ]
+            found += [replace(one, fold=c == 0 and is_fold(self.step, one.s)) for one in changes]
         return found
 
     def _returns(self, a: Mark, b: Mark) -> bool:
         """Whether a branch returns to its path across a fold: its mode just touches zero."""
-        first, last = (
-            m.point.solution.observables[self.system.conjugate][1] for m in (a, b)
-        )
+        first, last = (m.point.solution.observables[self.system.conjugate][1] for m in (a, b))
         return first * last <= 0.0
 
     def _beside(self, group: list[Mark], singular: list[Mark], end: float) -> tuple[float, float]:

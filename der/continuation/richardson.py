@@ -1,29 +1,45 @@
-"""Barriers with error bars: extrapolated from N, N/2 and N/4 edges by Romberg's scheme.
+"""Richardson extrapolation from three meshes, cells doubling, errors in even powers of the cell.
 
-Rests are defined without any mesh, by M = 0, so their energies have error series in even powers of
-the cell, and so have the barriers: states of the three meshes need not be matched.
+Sources: Richardson (1911), Phil. Trans. A 210; Romberg (1955), K. Norske Vid. Selsk. Forh. 28.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
-Extrapolated = Mapping[str, tuple[float, float]]  # name -> value and error
+import numpy as np
+
+from der.problem import Array
+
+Extrapolated: TypeAlias = Mapping[str, tuple[float, float]]  # name -> value and error
+
+# weights of the values at h, 2h and 4h: (4, -1)/3 for one term, and (16, -1)/15 of two such
+_ROMBERG = np.array([[1.0, 0.0, 0.0], [4.0 / 3.0, -1.0 / 3.0, 0.0], [64 / 45, -20 / 45, 1 / 45]])
 
 
-def romberg(fine: float, middle: float, coarse: float) -> tuple[float, float]:
-    """Limit of three values whose cells double, and its error: what the last stage has changed."""
-    finer, coarser = (4.0 * fine - middle) / 3.0, (4.0 * middle - coarse) / 3.0
-    value = (16.0 * finer - coarser) / 15.0
-    return value, abs(value - finer)
+def romberg(levels: Array) -> Array:
+    """Values at h, the same less their h^2 term, and less their h^4 term: (3, ...) as ``levels``.
+
+    Parameters
+    ----------
+    levels : (3, ...) values at h, 2h and 4h.
+    """
+    extrapolated: Array = _ROMBERG @ levels
+    return extrapolated
 
 
-def extrapolated(levels: Sequence[Mapping[str, float | None]]) -> Extrapolated:
-    """Values and errors of all that is known on each of three meshes, the finest first."""
+def limit(fine: float, middle: float, coarse: float) -> tuple[float, float]:
+    """Return the limit of three values, and its error: what the last stage has changed."""
+    _, once, twice = romberg(np.array([fine, middle, coarse])).tolist()
+    return twice, abs(twice - once)
+
+
+def limits(levels: Sequence[Mapping[str, float | None]]) -> Extrapolated:
+    """Return `limit` of everything that is known on each of three meshes, the finest first."""
     found = {}
     for name in levels[0]:
-        values = [level[name] for level in levels]
-        known = [value for value in values if value is not None]
+        known = [value for level in levels if (value := level[name]) is not None]
         if len(known) == 3:
-            found[name] = romberg(*known)
+            found[name] = limit(*known)
     return found

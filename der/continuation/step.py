@@ -44,9 +44,7 @@ class Step(Generic[S]):
         rate = self.system.transport(jump, self.end.tangent)
         # s is measured along the tangent at the start
         object.__setattr__(self, "jump", jump)
-        object.__setattr__(
-            self, "end_rate", rate / self.system.inner(self.start.tangent, rate)
-        )
+        object.__setattr__(self, "end_rate", rate / self.system.inner(self.start.tangent, rate))
 
     @cached_property
     def _curve(self) -> Interpolant:

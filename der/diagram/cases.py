@@ -178,11 +178,11 @@ def solve_case(case: Case) -> Row:
 
     A case that cannot be stated or solved is a row that says why; nothing is raised.
     """
-    from der.bvp.solve import solve  # kernels: only where cases are solved, not where counted
+    from der.bvp.solve import solve_bvp  # kernels: only where cases are solved, not where counted
 
     started = time.perf_counter()
     try:
-        path = solve(case.scene(save_at=()), tolerance=case.tolerance)
+        path = solve_bvp(case.scene(save_at=()), tolerance=case.tolerance)
         row = row_of(case, path)
     except Exception as problem:  # whatever it is, it must not take the other cases along
         row = failed(case, f"{type(problem).__name__}: {problem}")

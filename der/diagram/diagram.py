@@ -1,6 +1,6 @@
 """Phase diagrams of folding modes: scanned, their boundaries followed, drawn and tabled.
 
-    diagram = phase("fig3a", "out/fig3a", resume=True)
+    diagram = phase_diagram("fig3a", "out/fig3a", resume=True)
 
 New Python processes are started, so a script calls this under ``if __name__ == "__main__"``.
 """
@@ -27,7 +27,7 @@ from der.diagram.store import Store
 from der.diagram.workers import workers as started
 from der.utils.files import FilePath, write_whole
 
-__all__ = ["FAMILIES", "Diagram", "phase", "run_phase"]
+__all__ = ["FAMILIES", "Diagram", "phase_diagram", "run_phase"]
 
 STORE = "cases.jsonl"
 SAMPLE = 40
@@ -65,7 +65,7 @@ class Diagram:
         return self.scan.sorted_rows
 
 
-def phase(
+def phase_diagram(
     name: str,
     folder: FilePath,
     *,
@@ -155,7 +155,7 @@ def run_phase(
 
     What the boundaries leave open is told to ``warn``, quiet or not.
     """
-    diagram = phase(
+    diagram = phase_diagram(
         name,
         folder,
         workers=workers,

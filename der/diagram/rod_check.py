@@ -61,7 +61,7 @@ def rod_check(scan: Scan, fold: Fold, sample: int) -> tuple[Compared, ...]:
 def _compared(row: Row, fold: Fold, *, near: bool) -> Compared:
     try:
         scene = row.case.scene(
-            n_edges=EDGES, error_bars=True, stability=False, contacts=False, save_at=()
+            n_edges=EDGES, error_bars=True, stability=False, self_crossings=False, save_at=()
         )
         rod = row_of(row.case, fold(scene))
     except Exception as problem:  # a rod that cannot be folded is a row of the table

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.geometry.mesh import sites
 from der.geometry.ring import Ring
 from der.geometry.section import rectangular_section
@@ -99,7 +99,7 @@ class Case:
             until=until,
             save_at=save_at,
         )
-        return solve(scene)
+        return solve_bvp(scene)
 
 
 @dataclass(frozen=True, eq=False)

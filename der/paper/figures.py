@@ -51,9 +51,9 @@ def _draw_diagram(
     name: str, folder: FilePath, workers: int | None, warn: Callable[[str], object]
 ) -> list[File]:
     """Draw a phase diagram in a folder of its own; the cases that are there are not repeated."""
-    from der.diagram.diagram import doubts, phase
+    from der.diagram.diagram import doubts, phase_diagram
 
-    diagram = phase(name, File(folder) / name, workers=workers, resume=True)
+    diagram = phase_diagram(name, File(folder) / name, workers=workers, resume=True)
     for words in doubts(diagram):
         warn(f"{name}: {words}")
     return list(diagram.files)

@@ -113,7 +113,7 @@ def loop(name: str) -> Loop:
     """One of the `SNAPPING` rings, loaded and unloaded."""
     ring, h_over_t = SNAPPING[name]
     section = rectangular_section(h_over_t)
-    scene = Scene(ring, section, n_edges=EDGES, contacts=False, shapes=True, save_at=LOADS)
+    scene = Scene(ring, section, n_edges=EDGES, self_crossings=False, shapes=True, save_at=LOADS)
     turned = fold(replace(scene, control="angle", unload=True, history=True))
     landed = {point.gamma for point in turned.points if point.kind == "snap"}
     return Loop(name, fold(replace(scene, save_at=tuple({*LOADS, *landed}))), turned)

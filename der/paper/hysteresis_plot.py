@@ -47,7 +47,9 @@ def figure_of_loops(loops: list[Loop]) -> Figure:
         Line2D([], [], color=colour, linestyle=dashes, linewidth=width, label=label)
         for label, colour, dashes, width in LINES
     ]
-    style.legend_below(figure, [*handles, Line2D([], [], label="end state of a snap", **STAR)], fontsize=8.5)
+    style.legend_below(
+        figure, [*handles, Line2D([], [], label="end state of a snap", **STAR)], fontsize=8.5
+    )
     return figure
 
 

@@ -8,13 +8,14 @@ where it enters, by name. Angles in radians, moments in GJ/a, energies of the fu
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Self
 
 import numpy as np
 
+from der.errors import Reason
 from der.records.configurations import Shapes
 from der.utils import checks
 from der.utils.checks import Array, Counts, optional
@@ -24,9 +25,9 @@ SCHEMA = 1
 SOLVERS = ("der", "bvp")
 KINDS = ("fold", "limit", "branch", "snap", "contact")
 SNAPPING = ("none", "snap-through", "snap-back")
+REASONS = ("", *(reason.word for reason in Reason))
 STATUSES = ("done", "not converged", "interrupted")
 ARRAYS = ("gamma", "moment", "energy", "index", "index_moment")
-NEVER = "gamma turns back before gamma_max, and the path runs to -gamma_max without arriving"
 ARRIVAL = 1e-9  # rad; a path is solved for at pi to 1e-10
 NO_MOMENT = 1e-6  # of the largest |M|; the folded ring is planar to the same
 
@@ -134,12 +135,14 @@ class Path(Kept):
     shapes: Shapes | None = None  # not in the JSON
     status: str = "done"  # one of STATUSES; what there is of an incomplete path is good
     message: str = ""  # a sentence about the status
+    reason: str = ""  # why it ended: the `word` of a der.errors.Reason; "" where it is just done
     raw: Mapping[str, object] | None = None  # with error bars: values at the finest N, by name
 
     def __post_init__(self) -> None:
         checks.one_of("solver", self.solver, SOLVERS)
         checks.one_of("status", self.status, STATUSES)
         _check(self, checks.text, "message")
+        checks.one_of("reason", self.reason, REASONS)
         _check(self, checks.json_object, "ring", "section", "numerics")
         _check(self, optional(checks.json_object), "error", "raw")
         _check(self, checks.numbers, "gamma", "moment", "energy")
@@ -190,10 +193,15 @@ class Path(Kept):
     def _of_kind(self, kind: str) -> tuple[Point, ...]:
         return tuple(point for point in self.points if point.kind == kind)
 
+    def interrupted(self) -> Path:
+        """The same path as one that the user stopped."""
+        why = Reason.INTERRUPTED
+        return replace(self, status="interrupted", message=why.value, reason=why.word)
+
     def to_json(self) -> str:
         """JSON text of schema 1, one entry a line."""
         entries: dict[str, object] = {"schema": SCHEMA, "solver": self.solver}
-        for name in ("status", "message", "ring", "section", "numerics"):
+        for name in ("status", "message", "reason", "ring", "section", "numerics"):
             entries[name] = getattr(self, name)
         for name in ARRAYS:
             entries[name] = getattr(self, name).tolist()  # masked becomes None

@@ -68,7 +68,9 @@ class EndState:
 class _Rule(Protocol):
     """How rates lead from one configuration to the next."""
 
-    order: int  # the error of a step grows with this power of its length
+    @property
+    def order(self) -> int:
+        """Power of a step's length with which its error grows."""
 
     def ahead(self, dt: float) -> Array:
         """Displacement (n b + 1,) expected over a step."""
@@ -102,7 +104,7 @@ class _Overdamped:
     def terms(self, dt: float) -> tuple[Array, float]:
         return np.zeros(len(self.mass)), 1.0 / dt
 
-    def after(self, w: Array, dt: float) -> _Overdamped:
+    def after(self, w: Array, dt: float) -> _Rule:
         return _Overdamped(self.mass, w / dt)
 
     def error(self, w: Array, dt: float) -> float:

@@ -27,7 +27,7 @@ _LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the
 
 # what closes the equations, and how the kernel ends
 LOAD_HELD, DIRECTION_HELD, MOMENT_HELD = range(3)
-_REASONS = (
+REASONS = (
     Reason.CONVERGED,
     Reason.TOO_MANY_ITERATIONS,
     Reason.DIVERGED,
@@ -237,7 +237,7 @@ def correct(
             "energy": (energy, conjugate * load_rate),
         },
         index=negative - len(supports.target) if negative >= 0 else None,
-        reason=_REASONS[outcome],
+        reason=REASONS[outcome],
         detail=f"vertex {where}" if where >= 0 else "",
         iterations=taken,
         residual=residual,

@@ -1,10 +1,11 @@
-"""The ring with its grips removed: is a state one of its equilibria, and how many ways lead down.
+"""The free ring: whether a state is an equilibrium once the grips are removed, and its index.
 
 A twisted ring is mapped onto itself by the half-turn about its twisting axis, which swaps the arms.
 What the arms exert on a grip is therefore symmetric under it: a force along the axis, which the
 free slide makes zero, and a moment about the axis, which is 2 M. So at M = 0 the grips exert
-nothing at all, bending moments included: **every rest of a twisted ring is an equilibrium of the
-ring left alone**, stable or not. (They still guide: in clamped grips fewer motions are allowed.)
+nothing at all, bending moments included: **every state of a twisted ring with M = 0 is an
+equilibrium of the free ring**, stable or not. (They still guide: in clamped grips fewer motions are
+allowed.)
 
 A ring of uniform natural curvature has one more motion at no cost, where it is not planar: material
 shifts along the curve. On the mesh it costs next to nothing, and as the rigid rotations are taken
@@ -24,11 +25,11 @@ import numpy as np
 
 from der.kernels.assembly import assemble
 from der.kernels.quaternions import Array, rotation, rotation_vector
-from der.rod.equilibrium import Equilibrium, equilibrium
-from der.rod.gripped_ring import GrippedRing, free_ring
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, free_supports
 from der.rod.rod import Rod, State
-from der.rod.stability import all_modes, index
 from der.rod.supports import Supports
+from der.rod.system import RodSystem
 
 BALANCED = 1e-8  # residual over the ring's largest bending stiffness EI/cell: at rest
 _UNIFORM = 1e-9  # of strains and cells that are equal
@@ -36,8 +37,8 @@ _PLANAR = 1e-6  # of a shift that is a rigid rotation
 
 
 @dataclass(frozen=True)
-class Alone:
-    """A configuration of the ring left alone, with the forces that balance it best."""
+class FreeRing:
+    """A configuration of the free ring, with the forces that balance it best."""
 
     rod: Rod  # of the full ring
     supports: Supports  # closed, one frame held; or its grips
@@ -84,32 +85,47 @@ class Alone:
         return places
 
     def index(self) -> int | None:
-        """Ways down; None where it is no equilibrium, or singular."""
+        """Return the index, motions at no cost not counted; None: no equilibrium, or singular."""
         if not self.balanced:
             return None
-        supports = self.pinned()
-        return index(self.rod, supports, all_modes(supports), self.state)
+        return RodSystem(self.rod, self.pinned()).index(self.state)
 
     def polished(self, tolerance: float = 1e-10) -> Equilibrium:
-        """The equilibrium next to it, by Newton's method."""
-        return equilibrium(self.rod, self.pinned(), self.state, tolerance=tolerance)
+        """Return the equilibrium next to it, by Newton's method."""
+        return RodSystem(self.rod, self.pinned()).correct(self.state, tolerance=tolerance)
 
 
-def left_alone(ring: GrippedRing, whole: GrippedRing, state: State) -> Alone:
-    """A state of a sector on ``whole``, the full ring of the same mesh, without grips."""
+def index_without_grips(
+    ring: GrippedRing, full: GrippedRing, state: State, *, tolerance: float = 1e-10
+) -> int | None:
+    """Return the index of a state of ``ring`` once its grips are removed; None: it would move.
+
+    ``full`` is the full ring on the same mesh. An extensible ring first settles: the grips also
+    held the length of their two edges.
+    """
+    free = released(ring, full, state)
+    if not free.balanced and full.rod.stretching > 0.0:
+        settled = free.polished(tolerance)
+        if settled.converged:
+            free = balance(full.rod, settled.state.quat, settled.state.stretch)
+    return free.index()
+
+
+def released(ring: GrippedRing, full: GrippedRing, state: State) -> FreeRing:
+    """A state of a sector on ``full``, the full ring of the same mesh, without grips."""
     quat = ring.full_frames(state)
-    stretch = ring.full_lengths(state) / whole.rod.length - 1.0
-    return balance(whole.rod, quat, stretch)
+    stretch = ring.full_lengths(state) / full.rod.length - 1.0
+    return balance(full.rod, quat, stretch)
 
 
 def balance(
     rod: Rod, quat: Array, stretch: Array, supports: Supports | None = None, load: float = 0.0
-) -> Alone:
+) -> FreeRing:
     """A configuration with the forces that balance it best, in least squares.
 
     ``held`` are its supports, none but closure if not given, turned to ``load``.
     """
-    supports = free_ring(rod) if held is None else supports
+    supports = free_supports(rod) if supports is None else supports
     nothing = np.zeros(len(supports.target))
     system = assemble(rod, supports, quat, stretch, nothing, load)
     free = supports.free.reshape(-1)
@@ -118,7 +134,7 @@ def balance(
     force = -np.linalg.lstsq(border, grad, rcond=None)[0]
     gap = float(np.abs(system.gap).max())
     residual = max(float(np.abs(grad + border @ force).max()), gap)
-    return Alone(rod, supports, State(quat, stretch, force, load), residual)
+    return FreeRing(rod, supports, State(quat, stretch, force, load), residual)
 
 
 def shift(rod: Rod, state: State) -> Array:

@@ -223,10 +223,10 @@ def _quarter(rod: Rod) -> tuple[Supports, Classes]:
     }
 
 
-def free_ring(rod: Rod) -> Supports:
+def free_supports(rod: Rod) -> Supports:
     """Supports of a closed rod without grips: it has to stay closed, and nothing else.
 
-    The frame of edge 0 is supports, which takes out rigid rotations; translations are no unknowns.
+    The frame of edge 0 is held, which takes out rigid rotations; translations are no unknowns.
     """
     one = np.ones(rod.n_edges)
     supports = supported(rod, clamped=(0,), held=((one, E1, 0.0), (one, E2, 0.0), (one, E3, 0.0)))

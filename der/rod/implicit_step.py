@@ -20,10 +20,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
+from der.errors import Reason
 from der.kernels.assembly import assemble, take_out
 from der.kernels.block_ldl import factor, inertia, solve_refined
 from der.kernels.quaternions import Array, into_frame, rotation_vector, turned
-from der.rod.equilibrium import Outcome
+from der.rod.equilibrium import REASONS
 from der.rod.rod import Rod, State
 from der.rod.supports import Supports, check_cut
 
@@ -33,10 +34,10 @@ _ITERATIONS = 6  # a step that needs more is too long
 
 @dataclass(frozen=True, slots=True)
 class Stepped:
-    """An implicit step; where ``outcome`` is not CONVERGED, its last iterate."""
+    """An implicit step; where ``reason`` is not CONVERGED, its last iterate."""
 
     state: State
-    outcome: Outcome
+    reason: Reason
     where: int  # vertex that is bent too far; -1: none
     iterations: int
     w: Array  # (n b + 1,) the step: rotation vectors and stretches, flat, and the load
@@ -208,8 +209,8 @@ def step(
 
     Notes
     -----
-    Failure to converge is a value: see `Stepped.outcome`; a matrix that is singular or not positive
-    on the conditions is `Outcome.SINGULAR`. A shorter step helps.
+    Failure to converge is a value: see `Stepped.reason`; a matrix that is singular or not positive
+    on the conditions is `Reason.SINGULAR`. A shorter step helps.
     """
     check_cut(rod, supports.free)
     outcome, where, iterations, quat, stretch, force, load, w, energy, now, residual = _step(
@@ -230,7 +231,7 @@ def step(
         tolerance,
     )
     state = State(quat, stretch, force, load)
-    return Stepped(state, Outcome(outcome), where, iterations, w, energy, now, residual)
+    return Stepped(state, REASONS[outcome], where, iterations, w, energy, now, residual)
 
 
 def on_the_conditions(rod: Rod, supports: Supports, start: State) -> Stepped:

@@ -27,9 +27,10 @@ from numba import njit
 from der.kernels.forces import Motion, clear, conditions, gradient, no_pull
 from der.kernels.masses import Masses, condition_metric, solve_metric, weigh
 from der.kernels.quaternions import Array, into_frame, turned
-from der.rod.equilibrium import Direction, moved
-from der.rod.rod import Rod, State
+from der.problem import Increment
+from der.rod.rod import State
 from der.rod.supports import Supports
+from der.rod.system import RodSystem
 
 _MARGIN = 1.2  # of the masses above the lightest stable ones; 1.05 to 1.5: -10 to +70 % of the cost
 _HEAVIER = 1.5  # factor on the masses of a rod that has gained energy
@@ -328,18 +329,17 @@ def _at_rest(supports: Supports, state: State) -> Motion:
 
 
 def relax(
-    rod: Rod,
-    supports: Supports,
+    system: RodSystem,
     start: State,
     *,
-    kick: Direction | None = None,
+    kick: Increment | None = None,
     moment: float | None = None,
     stops: tuple[float, float] = (-np.inf, np.inf),
     tolerance: float = 1e-9,
     most: int = 200_000,
     every: int = 0,
 ) -> Relaxed:
-    """The state in which a rod comes to rest from ``start``.
+    """Return the state in which a rod comes to rest from ``start``.
 
     Parameters
     ----------
@@ -360,13 +360,14 @@ def relax(
     -----
     Failure to come to rest is a value: see `Relaxed.outcome` and `ADVICE`.
     """
+    rod, supports = system.rod, system.supports
     if rod.n_edges > len(rod.cell) + 1:
         raise ValueError(
-            f"body must have no more than {len(rod.cell) + 1} edges on {len(rod.cell)} vertices "
-            f"to be relaxed, got {rod.n_edges}: a strut falls by implicit steps (gradient_flow)"
+            f"rod must have no more than {len(rod.cell) + 1} edges on {len(rod.cell)} vertices "
+            f"to be relaxed, got {rod.n_edges}: a strut moves by implicit steps (dynamics.flow)"
         )
     if kick is not None:
-        start = moved(supports, start, kick)
+        start = system.retract(start, kick)
     n, b = supports.free.shape
     motion, pull = _at_rest(supports, start), no_pull(supports)
     masses = Masses(np.zeros((n, b, b)), np.zeros((n, b, b)), np.zeros(1))

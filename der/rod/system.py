@@ -1,8 +1,8 @@
 """A supported rod as a system that can be followed: the rod's side of the seam (`der.problem`).
 
-    system = RodSystem(rod, supports)
-    found = system.correct(state)                 an equilibrium next to a configuration
-    for point in follow(system, state, events):   its path as the load grows
+system = RodSystem(rod, supports)
+found = system.correct(state)                 an equilibrium next to a configuration
+for point in follow(system, state, events):   its path as the load grows
 """
 
 from __future__ import annotations
@@ -130,7 +130,8 @@ class RodSystem:
 
     def transport(self, along: Increment, rates: Increment) -> Increment:
         """Return rates at the end of an increment, in the frames of its start."""
-        moved: Increment = transport(*self.supports.free.shape, along, rates)
+        n, b = self.supports.free.shape
+        moved: Increment = transport(n, b, along, rates)
         return moved
 
     def inner(self, a: Increment, b: Increment) -> float:

@@ -1,8 +1,8 @@
 """One run loop for every analysis: Ctrl-C, failure, time and status, around what is handed out.
 
-    with Run() as run:
-        points = run.collect(follow(...), progress)
-    run.status, run.message, run.reason, run.seconds
+with Run() as run:
+    points = run.collect(follow(...), progress)
+run.status, run.message, run.reason, run.seconds
 """
 
 from __future__ import annotations
@@ -10,13 +10,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
+from dataclasses import replace
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from der.errors import ContinuationFailed, Reason
 from der.utils.interrupts import interrupts_between_states
 
 T = TypeVar("T")
+R = TypeVar("R", bound=Any)
 
 
 class Run:
@@ -68,11 +70,26 @@ class Run:
         self.status = "interrupted" if reason is Reason.INTERRUPTED else "not converged"
         self.reason, self.message = reason, message or reason.value
 
-    def collect(
-        self, found: Iterable[T], progress: Callable[[T], object] | None = None
-    ) -> list[T]:
+    def note(self, reason: Reason) -> None:
+        """Note something that a reader should know of an analysis that is done."""
+        self.reason, self.message = reason, reason.value
+
+    def prepare(self, work: Callable[[], object]) -> None:
+        """Do what does not count as time of the analysis, such as loading kernels."""
+        self.attempt(work)
+        self.started = time.perf_counter()
+
+    def marked(self, record: R) -> R:
+        """Return a record with the status that the analysis has come to by now."""
+        assert self.reason is not None
+        ending = {"status": self.status, "message": self.message, "reason": self.reason.word}
+        return replace(record, **ending)
+
+    def collect(self, found: Iterable[T], progress: Callable[[T], object] | None = None) -> list[T]:
         """Return everything that is handed out, until it fails or Ctrl-C is pressed."""
         kept: list[T] = []
+        if self.status != "done":
+            return kept
 
         def keep() -> None:
             for one in found:

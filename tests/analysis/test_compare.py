@@ -9,7 +9,7 @@ import pytest
 
 import der
 from der.analysis.compare import compare, table
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.cli.commands import main
 from der.records.path import Path
 
@@ -20,7 +20,7 @@ SECTION = der.rectangular_section(1.6)
 def scene():
     """A ring with two folds, with error bars."""
     return der.Scene(
-        der.circle(), SECTION, n_edges=128, error_bars=True, contacts=False, stability=False
+        der.circle(), SECTION, n_edges=128, error_bars=True, self_crossings=False, stability=False
     )
 
 
@@ -74,7 +74,7 @@ def test_without_error_bars_there_is_no_verdict(scene):
 def test_a_path_that_is_not_a_rods_is_refused(scene):
     """Comparing the boundary-value problem with itself would say nothing."""
     with pytest.raises(ValueError, match=r"rod must be a path of a rod .* got 'bvp'"):
-        compare(scene, solve(replace(scene, error_bars=False)))
+        compare(scene, solve_bvp(replace(scene, error_bars=False)))
 
 
 def run(*words):

@@ -276,7 +276,7 @@ def test_a_state_that_passes_a_branch_point_has_no_index():
     Of the state asked for in between, 64 edges say index 1 and fine meshes 3: it is not known. Over
     every other stretch between folds and branch points the index stays.
     """
-    wants = {"until": "folded", "contacts": False, "error_bars": True, "save_at": (5.425,)}
+    wants = {"until": "folded", "self_crossings": False, "error_bars": True, "save_at": (5.425,)}
     path = der.fold(der.Scene(der.circle(), der.rectangular_section(1.0), **wants))
     singular = {p.position: p for p in path.points if p.kind in ("fold", "branch")}
     now, unknown = 0, []

@@ -77,7 +77,7 @@ def test_shapes_are_not_kept_otherwise():
 
 def test_contacts_are_not_looked_for_where_not_asked_for():
     """The path of h/t 1.6 has one, which is left out then; all else is as before."""
-    without = folded(1.6, contacts=False)
+    without = folded(1.6, self_crossings=False)
     assert (len(folded(1.6).contacts), len(without.contacts)) == (1, 0)
     assert len(without) == len(folded(1.6)) - 1
 
@@ -344,7 +344,7 @@ def test_other_natural_curvatures_reach_pi(natural_curvature):
 @pytest.mark.parametrize("sector", ["quarter", "full"])
 def test_the_folded_ring_is_known_by_any_measure_of_curvature(curvature, sector):
     """It is covered three times where its frames turn by 6 pi; 2 tan(phi/2) are no angles."""
-    path = folded(curvature=curvature, sector=sector, contacts=False, until="folded")
+    path = folded(curvature=curvature, sector=sector, self_crossings=False, until="folded")
     assert path.gamma[-1] == math.pi
     assert path.mode.foldable
 
@@ -521,9 +521,10 @@ def test_a_path_that_never_arrives_is_unfoldable_and_says_so():
     """
     ring = der.rectangle(0.46090256772792904, 0.3814496387454095, "y")
     section = der.rectangular_section(3.3692299828162224, 0.0)
-    path = der.fold(der.Scene(ring, section, n_edges=128, stability=False, contacts=False))
+    path = der.fold(der.Scene(ring, section, n_edges=128, stability=False, self_crossings=False))
     assert (path.status, path.at_pi, path.gamma[-1]) == ("done", None, -math.pi)
     assert (path.mode.foldable, path.mode.snapping) == (False, "snap-back")
+    assert path.reason == "turned_back"
     assert "without arriving" in path.message
     folds = [point.gamma for point in path.folds]
     np.testing.assert_allclose(folds, [3.106268, 1.938953, 2.355590], atol=0.02)
@@ -536,6 +537,6 @@ def test_free_index_of_a_triangle(stretch):
     With finite stretch the ring settles a little when the grip lets its edge go.
     """
     ring = der.triangle(2 * math.pi / 3, 1 / 15)
-    scene = der.Scene(ring, der.rectangular_section(4.0), stretch=stretch, contacts=False)
+    scene = der.Scene(ring, der.rectangular_section(4.0), stretch=stretch, self_crossings=False)
     at_pi = der.fold(scene).at_pi
     assert (at_pi.index, at_pi.index_moment, at_pi.index_free) == (0, 0, 1)

@@ -13,10 +13,10 @@ import pytest
 from matplotlib.text import Text
 
 import der
-from der.analysis.landscape.barrier import free_barrier
+from der.analysis.landscape.barrier import barrier
 from der.analysis.landscape.landscape import landscape
 from der.analysis.landscape.over_thickness import barriers_over
-from der.analysis.landscape.surface import surface
+from der.analysis.landscape.surface import energy_surface
 from der.records.energy_surface import Surface
 from der.records.landscape import BarrierCurves, Landscape, Pass
 from der.viz.plots.energy_surface import figure_of_surface
@@ -41,12 +41,12 @@ def along(h_over_t=8.0):
 
 @functools.cache
 def sheet():
-    return surface(scene(1.6), shape=(9, 8))
+    return energy_surface(scene(1.6), shape=(9, 8))
 
 
 @functools.cache
 def alone(h_over_t=5.0):
-    return free_barrier(scene(h_over_t, der.ellipse(0.6)))
+    return barrier(scene(h_over_t, der.ellipse(0.6)))
 
 
 def test_json_of_a_landscape(tmp_path):
@@ -148,7 +148,7 @@ def test_ctrl_c_keeps_the_surface_so_far():
             os.kill(os.getpid(), signal.SIGINT)
 
     try:
-        one = surface(scene(4.0), shape=(12, 12), progress=press, snaps=False)
+        one = energy_surface(scene(4.0), shape=(12, 12), progress=press, snaps=False)
     except KeyboardInterrupt:  # pressed twice before it was seen
         pytest.fail("the first Ctrl-C must not raise")
     assert one.status == "interrupted"
@@ -160,7 +160,7 @@ def test_ctrl_c_keeps_the_surface_so_far():
 
 def test_cells_beyond_reach_have_a_reason():
     """At 99.9 % of full stretch, and gamma from 2 on, Newton and relaxation may find nothing."""
-    one = surface(
+    one = energy_surface(
         scene(4.0),
         gamma=np.linspace(0.0, math.pi, 5),
         shape=(5, 6),
@@ -177,13 +177,13 @@ def test_cells_beyond_reach_have_a_reason():
 def test_a_range_beyond_full_stretch_is_refused(bad):
     """Half the ring's length is the most."""
     with pytest.raises(ValueError, match="distance_range must rise"):
-        surface(scene(), distance_range=bad)
+        energy_surface(scene(), distance_range=bad)
 
 
 def test_the_full_ring_has_no_surface():
     """It would need both arms' distances."""
     with pytest.raises(ValueError, match="sector must be auto, half or quarter"):
-        surface(scene(sector="full"))
+        energy_surface(scene(sector="full"))
 
 
 def test_json_of_a_pass():
@@ -238,7 +238,7 @@ def curves():
 
 def records():
     """One of each kind; with rests that are no wells, cells without a minimum, and NaN."""
-    beyond = surface(
+    beyond = energy_surface(
         scene(4.0),
         gamma=np.linspace(0.0, math.pi, 4),
         shape=(4, 5),

@@ -12,13 +12,13 @@ from rods import turned_all
 
 import der
 from der.analysis.landscape.actuators import struts, wrenches
-from der.analysis.landscape.barrier import free_barrier, twisted_rests
+from der.analysis.landscape.barrier import barrier, twisted_rests
 from der.analysis.landscape.opening import least_push
 from der.analysis.landscape.opening_path import march
 from der.analysis.landscape.opening_search import Search, refine, scan
 from der.continuation.arclength import follow
 from der.continuation.events import Wanted
-from der.continuation.richardson import romberg
+from der.continuation.richardson import limit
 from der.continuation.step import Tally
 from der.kernels.assembly import assemble
 from der.kernels.forces import Motion, gradient, no_pull
@@ -48,8 +48,8 @@ def folded(h_over_t=4.0, n_edges=48):
 
 
 @functools.cache
-def barrier(h_over_t=4.0, n_edges=48):
-    return free_barrier(scene(h_over_t, n_edges=n_edges)).open
+def height_alone(h_over_t=4.0, n_edges=48):
+    return barrier(scene(h_over_t, n_edges=n_edges)).open
 
 
 def tool(points, direction, h_over_t=4.0, n_edges=48):
@@ -258,7 +258,7 @@ def test_a_push_to_the_pass_takes_the_free_barrier(points, direction):
     assert done.last.index == (0, 1)
     assert done.opens(done.last)
     assert done.last.lands.energy == pytest.approx(0.0, abs=1e-9)
-    assert done.last.work == pytest.approx(barrier(), abs=1e-9)
+    assert done.last.work == pytest.approx(height_alone(), abs=1e-9)
 
 
 def test_no_slow_push_takes_less_than_the_free_barrier():
@@ -268,7 +268,7 @@ def test_no_slow_push_takes_less_than_the_free_barrier():
     """
     works = [one.held.work for one in searched().pushes if one.opens]
     assert len(works) > 6
-    lowest = barrier(n_edges=24)
+    lowest = height_alone(n_edges=24)
     assert min(works) > lowest - 1e-7
     assert max(works) > 1.1 * lowest
 
@@ -277,12 +277,12 @@ def test_a_dead_load_gets_away_below_the_barrier():
     """Its limit comes before the pass; from there on it goes on working, and the ring is flat."""
     done = pushed((0, 16), "out of plane")
     assert done.dead.kind == "limit"
-    assert done.dead.work < 0.7 * barrier()
+    assert done.dead.work < 0.7 * height_alone()
     assert done.opens(done.dead)
     squeezed = pushed((0, 24), "together")
     assert squeezed.dead.kind == "branch"
     assert squeezed.dead.index == (0, 1)
-    assert squeezed.dead.work < 0.2 * barrier()
+    assert squeezed.dead.work < 0.2 * height_alone()
     assert squeezed.opens(squeezed.dead)
 
 
@@ -308,7 +308,7 @@ def test_a_push_costs_nothing_where_the_fold_ceases_to_be_stable():
     roots = []
     for h_over_t in (3.6, 3.5):
         works = [pushed((0, n // 3), "out of plane", h_over_t, n).last.work for n in (96, 48, 24)]
-        roots.append(math.sqrt(romberg(*works)[0]))
+        roots.append(math.sqrt(limit(*works)[0]))
     end = 3.5 - 0.1 * roots[1] / (roots[0] - roots[1])
     assert end == pytest.approx(3.46993, abs=3e-3)
 
@@ -320,7 +320,7 @@ def test_least_push_of_a_circle_without_a_mesh():
     changes 1e-4; the value is good to 1e-7, a sixth-order remainder.
     """
     works = [pushed((0, n // 3), "out of plane", n_edges=n).last.work for n in (96, 48, 24)]
-    value, error = romberg(*works)
+    value, error = limit(*works)
     assert value == pytest.approx(0.021087164, abs=1e-6)
     assert 1e-6 < error < 2e-4
 

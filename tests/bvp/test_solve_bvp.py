@@ -1,4 +1,4 @@
-"""From the scene to the record by the boundary-value problem: `der.bvp.solve.solve`."""
+"""From the scene to the record by the boundary-value problem: `der.bvp.solve.solve_bvp`."""
 
 import math
 import signal
@@ -9,7 +9,7 @@ from boundary_value import path, scene
 
 import der
 from der.bvp import solve as solving
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.geometry.mesh import sites
 
 EIGHTH = math.pi / 8
@@ -65,7 +65,7 @@ def test_a_stiff_ring_keeps_its_first_errors_small():
     """Extended by 0.02 rad its first slope is far above any moment that it ever has."""
     ring = der.triangle(math.radians(130.8), 0.005)
     tolerance = 2e-6
-    found = solve(der.Scene(ring, der.rectangular_section(53.0, nu=0.5)), tolerance=tolerance)
+    found = solve_bvp(der.Scene(ring, der.rectangular_section(53.0, nu=0.5)), tolerance=tolerance)
     assert 0.02 * found.moment[1] / found.gamma[1] > 5.0 * found.moment.max()
     assert max(found.error["moment"]) < tolerance * np.abs(found.moment).max()
 
@@ -135,13 +135,13 @@ def test_unfoldable_ring_is_followed_until_it_is_folded():
 def test_progress_is_told_of_every_state():
     """Called with gamma, in path order, folds included."""
     gammas: list[float] = []
-    record = solve(scene(der.circle(), 1.6), progress=gammas.append)
+    record = solve_bvp(scene(der.circle(), 1.6), progress=gammas.append)
     assert gammas == record.gamma.tolist()
 
 
 def test_solving_twice_gives_the_same_bits():
     """Nothing is random, and no state is left behind."""
-    first, second = (solve(scene(der.triangle(1.2, 0.1), 3.0)) for _ in range(2))
+    first, second = (solve_bvp(scene(der.triangle(1.2, 0.1), 3.0)) for _ in range(2))
     np.testing.assert_array_equal(first.gamma, second.gamma)
     np.testing.assert_array_equal(first.energy, second.energy)
 
@@ -229,7 +229,7 @@ def test_shapes_are_those_of_the_discrete_rod():
     for n in (32, 64):
         wants = {"shapes": True, "n_edges": n, "gamma_max": 1.0, "save_at": (1.0,)}
         ours = path(der.circle(), 4.0, **wants)
-        rod = der.fold(scene(der.circle(), 4.0, stability=False, contacts=False, **wants))
+        rod = der.fold(scene(der.circle(), 4.0, stability=False, self_crossings=False, **wants))
         assert ours.gamma[-1] == rod.gamma[-1] == 1.0
         gaps.append(
             [
@@ -255,7 +255,7 @@ def test_no_shapes_are_kept_unless_asked_for():
 def test_tolerances_that_cannot_be_kept_are_refused(tolerance):
     """By name, with what is allowed and what was given."""
     with pytest.raises(ValueError, match=r"^tolerance must be a number .*1e-11 to 0\.001.*, got "):
-        solve(scene(der.circle(), 4.0), tolerance=tolerance)
+        solve_bvp(scene(der.circle(), 4.0), tolerance=tolerance)
 
 
 @pytest.mark.parametrize(
@@ -273,14 +273,14 @@ def test_what_this_solver_has_not_is_refused(name, wants):
     with pytest.raises(
         ValueError, match=f"^{name} must be .* boundary-value problem, got '{value}'$"
     ):
-        solve(scene(der.circle(), 4.0, **wants))
+        solve_bvp(scene(der.circle(), 4.0, **wants))
 
 
 @pytest.mark.parametrize("what", [None, "circle", der.circle()], ids=["none", "str", "ring"])
 def test_only_scenes_are_solved(what):
     """A ring alone, or a word, is no scene."""
     with pytest.raises(ValueError, match=r"^scene must be a der\.Scene, got "):
-        solve(what)
+        solve_bvp(what)
 
 
 @pytest.mark.parametrize("states", [1, 9])
@@ -294,7 +294,7 @@ def test_interrupting_keeps_the_path(states):
             raise KeyboardInterrupt
 
     with pytest.raises(der.Interrupted) as caught:
-        solve(scene(der.circle(), 4.0), progress=stop)
+        solve_bvp(scene(der.circle(), 4.0), progress=stop)
     assert caught.value.path.status == "interrupted"
     assert caught.value.path.gamma.tolist() == seen
 
@@ -309,7 +309,7 @@ def test_ctrl_c_while_the_record_is_made_keeps_the_path(monkeypatch):
 
     monkeypatch.setattr(solving, "_shapes", press_and_sample)
     with pytest.raises(der.Interrupted) as caught:
-        solve(scene(der.circle(), 4.0, shapes=True))
+        solve_bvp(scene(der.circle(), 4.0, shapes=True))
     path = caught.value.path
     assert (path.status, path.gamma[-1], len(path.shapes.x)) == ("interrupted", math.pi, len(path))
 
@@ -317,7 +317,8 @@ def test_ctrl_c_while_the_record_is_made_keeps_the_path(monkeypatch):
 def test_a_path_that_never_arrives_is_unfoldable_and_says_so():
     """A ring whose path turns back before pi: done, with a mode, a sentence, and nothing at pi."""
     ring = der.rectangle(0.46090256772792904, 0.3814496387454095, "y")
-    path = solve(der.Scene(ring, der.rectangular_section(3.3692299828162224, 0.0)))
+    path = solve_bvp(der.Scene(ring, der.rectangular_section(3.3692299828162224, 0.0)))
     assert (path.status, path.at_pi) == ("done", None)
     assert (path.mode.foldable, path.mode.snapping) == (False, "snap-back")
+    assert path.reason == "turned_back"
     assert "without arriving" in path.message

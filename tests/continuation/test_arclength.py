@@ -127,7 +127,7 @@ def test_moment_is_stationary_at_a_limit(h_over_t):
 def test_index_differs_across_folds_and_branches():
     """The bracket of every fold and branch point holds different indices."""
     for h_over_t, until, count in ((1.6, None, 2), (1.0, "folded", 5)):
-        path = folded(h_over_t, until=until, contacts=False)
+        path = folded(h_over_t, until=until, self_crossings=False)
         points = [point for point in path.points if point.kind in ("fold", "branch")]
         assert len(points) == count
         assert all(point.index_before != point.index_after for point in points)
@@ -253,7 +253,7 @@ def test_path_that_bends_too_far_keeps_what_was_found():
     alpha = 100, beta = 0.001: vertices near the grip bend by more than 160 degrees, beyond which
     the energy is not defined. Failure is a value with a sentence.
     """
-    scene = der.Scene(der.circle(), der.section(alpha=100.0, beta=0.001), contacts=False)
+    scene = der.Scene(der.circle(), der.section(alpha=100.0, beta=0.001), self_crossings=False)
     with pytest.raises(der.NotConverged, match=r"vertex 15 .* use more edges") as caught:
         der.fold(scene)
     assert caught.value.path.status == "not converged"
@@ -293,7 +293,7 @@ def test_branch_beside_a_fold_is_told_from_it():
 def test_index_changes_only_at_points():
     """Over every segment between special points the index is constant, also on a wild path."""
     scene = der.Scene(
-        der.circle(natural_curvature=2.0), der.rectangular_section(0.3), contacts=False
+        der.circle(natural_curvature=2.0), der.rectangular_section(0.3), self_crossings=False
     )
     path = der.fold(scene)
     singular = {p.position: p for p in path.points if p.kind in ("fold", "branch")}

@@ -33,7 +33,7 @@ STADIUM = der.rectangle(0.2, 0.2)
 
 
 def branches(ring, h_over_t, **numerics):
-    scene = der.Scene(ring, der.rectangular_section(h_over_t), contacts=False, **numerics)
+    scene = der.Scene(ring, der.rectangular_section(h_over_t), self_crossings=False, **numerics)
     path = der.fold(scene)
     return [(p.gamma, p.details["symmetry"], p.index_before, p.index_after) for p in path.branches]
 
@@ -75,7 +75,7 @@ def test_two_limits_within_one_step_are_found_at_any_length_of_steps(monkeypatch
     Truth: steps a seventh as long.
     """
     section = der.rectangular_section(h_over_t, nu=0.5)
-    wants = {"curvature": "angle", "contacts": False, "save_at": (1.64, 1.69)}
+    wants = {"curvature": "angle", "self_crossings": False, "save_at": (1.64, 1.69)}
     scene = der.Scene(der.circle(), section, n_edges=32, **wants)
     found = der.fold(scene).points
     monkeypatch.setattr("der.continuation.arclength.LARGEST_STEP", 0.05)
@@ -108,7 +108,7 @@ def test_two_changes_of_an_index_within_one_step_are_found():
 
 def test_both_changes_are_on_the_path():
     """The whole path has the fold, the two branch points and the other fold, told apart."""
-    found = der.fold(der.Scene(NEARLY, SECTION, contacts=False))
+    found = der.fold(der.Scene(NEARLY, SECTION, self_crossings=False))
     kinds = [(p.kind, p.index_before, p.index_after) for p in found.points if p.kind != "limit"]
     assert kinds == [("fold", 0, 1), ("branch", 1, 2), ("branch", 2, 1), ("fold", 1, 0)]
 
@@ -161,7 +161,7 @@ def test_a_pair_breaks_the_symmetry_of_a_stadium_before_it_is_folded():
     """
     for name in ("quarter", "full"):
         found = der.fold(
-            der.Scene(STADIUM, der.rectangular_section(1.5), sector=name, contacts=False)
+            der.Scene(STADIUM, der.rectangular_section(1.5), sector=name, self_crossings=False)
         )
         gammas = [p.gamma for p in found.branches]
         assert gammas == pytest.approx([2.9703435] * len(gammas), abs=1e-7)
@@ -214,7 +214,7 @@ def test_states_of_the_half_are_those_of_the_full_ring():
 
 def singular(ring, h_over_t, **numerics):
     """Folds and branch points of a path, as far as it goes."""
-    scene = der.Scene(ring, der.rectangular_section(h_over_t), contacts=False, **numerics)
+    scene = der.Scene(ring, der.rectangular_section(h_over_t), self_crossings=False, **numerics)
     return [p for p in der.fold(scene).points if p.kind in ("fold", "branch")]
 
 

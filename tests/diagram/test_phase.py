@@ -15,7 +15,7 @@ import pytest
 import der
 from der.diagram.boundaries import Boundaries
 from der.diagram.cases import LABELS, Row
-from der.diagram.diagram import phase, run_phase
+from der.diagram.diagram import phase_diagram, run_phase
 from der.diagram.families import family
 from der.diagram.rod_check import rod_check, table
 from der.diagram.scan import scan
@@ -80,7 +80,7 @@ def folder(tmp_path_factory):
 def diagram(folder, without_curves):
     """A small part of fig3a round the circle, with the rod asked about some of it."""
     options = {"ranges": CIRCLES, "finest": 4, "check": der.fold, "sample": 8}
-    return phase("fig3a", folder, workers=2, progress=False, **options)
+    return phase_diagram("fig3a", folder, workers=2, progress=False, **options)
 
 
 # --- The files -------------------------------------------------------------------------------
@@ -120,9 +120,9 @@ def test_folder_with_cases_is_refused_unless_resumed(diagram, folder):
     """Nothing that is finished is ever overwritten by mistake."""
     options = {"ranges": CIRCLES, "finest": 4, "workers": 1, "progress": False}
     with pytest.raises(ValueError, match="resume must be asked for in a folder that has cases"):
-        phase("fig3a", folder, **options)
+        phase_diagram("fig3a", folder, **options)
     before = (folder / "cases.csv").read_bytes()
-    again = phase("fig3a", folder, resume=True, **options)
+    again = phase_diagram("fig3a", folder, resume=True, **options)
     assert again.scan.solved == 0
     assert (folder / "cases.csv").read_bytes() == before
 
@@ -151,7 +151,9 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
         monkeypatch.setattr("der.diagram.diagram.follow", lambda *_, c=curves: Boundaries(c, []))
         options = {"ranges": ["b_over_a=0.9:1", "h-over-t=1.25:2.25"], "finest": 4, "quiet": True}
         run_phase("fig3a", folder, workers=1, resume=True, warn=told.append, **options)
-    monkeypatch.setattr("der.diagram.diagram.phase", lambda *_, **__: replace(diagram, curves=half))
+    monkeypatch.setattr(
+        "der.diagram.diagram.phase_diagram", lambda *_, **__: replace(diagram, curves=half)
+    )
     draw(["fig3a"], folder, warn=told.append)
     assert told[-2:] == told[-4:-2]
     assert re.fullmatch(r"fig3a: edges of the scan without a boundary .*: \d+", told[0])
@@ -178,7 +180,7 @@ def test_what_is_not_allowed_is_refused_by_name(tmp_path, options, message):
 def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ValueError, match=r"folder must be one that can be made, got .*file'"):
-        phase("fig3a", tmp_path / "file")
+        phase_diagram("fig3a", tmp_path / "file")
 
 
 def test_no_worker_is_left_behind(diagram):
@@ -194,7 +196,7 @@ def test_figure_has_a_folder_of_its_own(diagram, tmp_path, monkeypatch):
         asked.append((name, folder, options["resume"]))
         return replace(diagram, files=(tmp_path / "fig3a" / "fig3a.png",))
 
-    monkeypatch.setattr("der.diagram.diagram.phase", note)
+    monkeypatch.setattr("der.diagram.diagram.phase_diagram", note)
     drawn = draw(["fig3a"], tmp_path)
     assert drawn.written == {"fig3a": [tmp_path / "fig3a" / "fig3a.png"]}
     assert asked == [("fig3a", tmp_path / "fig3a", True)]

@@ -20,7 +20,7 @@ def test_points_of_an_ellipse_fold_like_the_ellipse(tmp_path):
     ring = read_profile(str(file))
     assert ring.length == pytest.approx(der.ellipse(0.6).length, rel=1e-7)
     paths = [
-        der.fold(der.Scene(r, der.rectangular_section(4.0), n_edges=32, contacts=False))
+        der.fold(der.Scene(r, der.rectangular_section(4.0), n_edges=32, self_crossings=False))
         for r in (ring, der.ellipse(0.6))
     ]
     assert paths[0].at_pi.slope == pytest.approx(paths[1].at_pi.slope, rel=1e-4)

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 import der
 from der.bvp.continuation import Tally, Wanted, follow
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from validation.stress.random_rings import largest_error, random_rings, survey, work_missing
 
 CIRCLE = der.circle()
@@ -424,7 +424,7 @@ def test_an_ellipse_by_points_is_the_ellipse():
     """
     tau = np.linspace(0, 2 * math.pi, 64, endpoint=False) - math.pi / 2
     ring = der.profile(points=np.column_stack([np.cos(tau), 0.6 * np.sin(tau)]))
-    record = solve(scene(ring, 4.0, save_at=(1.0, 2.0)), tolerance=1e-6)
+    record = solve_bvp(scene(ring, 4.0, save_at=(1.0, 2.0)), tolerance=1e-6)
     exact = path(der.ellipse(0.6, "x"), 4.0, save_at=(1.0, 2.0))
     for gamma in (1.0, 2.0, math.pi):
         for name in ("moment", "energy"):

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import der
 from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error, read_reference
 from der.analysis.error_bars import ErrorBars, error_bars
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.continuation.arclength import follow
 from der.continuation.events import Visit, Wanted
 from der.continuation.step import Tally
@@ -301,7 +301,7 @@ def test_states_between_a_fold_and_its_extrapolation_are_those_of_the_curve(
     Every state of the boundary-value problem is there, within the error bars, and no other.
     """
     scene = der.Scene(ring, der.rectangular_section(h_over_t, nu), error_bars=True)
-    path, reference = der.fold(scene), solve(scene, tolerance=1e-9)
+    path, reference = der.fold(scene), solve_bvp(scene, tolerance=1e-9)
     raw = np.array(path.raw["gamma"])
     folds = [(raw[p.position], p.gamma) for p in path.folds]
     assert sum((a - gamma) * (b - gamma) < 0.0 for a, b in folds) == 1

@@ -9,11 +9,11 @@ from rods import dense, on_conditions, richardson
 from scipy.interpolate import CubicSpline
 
 import der
-from der.analysis.landscape.barrier import free_barrier
+from der.analysis.landscape.barrier import barrier
 from der.analysis.landscape.landscape import landscape, scene_sector
 from der.analysis.landscape.over_thickness import barriers_over
 from der.analysis.landscape.saddle_search import climb, downhill_modes
-from der.analysis.landscape.surface import surface
+from der.analysis.landscape.surface import energy_surface
 from der.rod.equilibrium import Direction
 from der.rod.free_ring import left_alone, shift
 from der.rod.relaxation import relax
@@ -39,12 +39,12 @@ def along(ring, h_over_t, **numerics):
 
 @functools.cache
 def alone(ring, h_over_t, n_edges=64):
-    return free_barrier(scene(ring, h_over_t, n_edges=n_edges))
+    return barrier(scene(ring, h_over_t, n_edges=n_edges))
 
 
 @functools.cache
 def sheet(ring, h_over_t, n):
-    return surface(scene(ring, h_over_t), shape=(n, n))
+    return energy_surface(scene(ring, h_over_t), shape=(n, n))
 
 
 def rest_left_alone(ring, h_over_t, which):
@@ -104,7 +104,7 @@ def test_barriers_are_differences_of_energy(ring, h_over_t):
     one = along(ring, h_over_t)
     saddle = one.rests[one.barriers.saddle].gamma
     path = der.fold(
-        scene(ring, h_over_t, contacts=False, stability=False, save_at=[saddle, math.pi])
+        scene(ring, h_over_t, self_crossings=False, stability=False, save_at=[saddle, math.pi])
     )
     (at,) = [k for k in range(len(path)) if abs(path.gamma[k] - saddle) < 1e-13][-1:]
     assert abs(path.moment[at]) < 1e-8
@@ -122,7 +122,7 @@ def test_the_barrier_is_the_work_of_the_moment():
     start = one.rests[one.barriers.saddle].gamma
     gammas = np.linspace(start, math.pi, 65)
     path = der.fold(
-        scene(der.circle(), 8.0, contacts=False, stability=False, save_at=tuple(gammas))
+        scene(der.circle(), 8.0, self_crossings=False, stability=False, save_at=tuple(gammas))
     )
     between = (path.gamma >= start - 1e-13) & np.isin(path.gamma, gammas)
     spline = CubicSpline(path.gamma[between], path.moment[between])
@@ -330,7 +330,7 @@ def test_a_ring_that_is_no_well_left_alone_has_no_barrier():
 
 def test_forces_are_the_slopes_of_the_surface():
     """4 M = dU/dgamma and F = dU/dd, against central differences on a fine patch."""
-    one = surface(
+    one = energy_surface(
         scene(der.circle(), 1.6),
         gamma=1.2 + 1e-3 * np.arange(5),
         shape=(5, 5),

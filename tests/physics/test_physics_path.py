@@ -40,7 +40,7 @@ def circle(h_over_t: float, n_edges: int = 64, **wants: object) -> der.Scene:
 @functools.cache
 def plain_path(h_over_t: float, n_edges: int) -> der.Path:
     """Path without indices and contacts."""
-    return der.fold(circle(h_over_t, n_edges, stability=False, contacts=False))
+    return der.fold(circle(h_over_t, n_edges, stability=False, self_crossings=False))
 
 
 def errors(h_over_t: float, sizes: tuple[int, ...]) -> np.ndarray:

@@ -73,7 +73,7 @@ def test_curves_and_folds_converge_with_the_square_of_the_edges(case):
     errors, folds = [], []
     for n_edges in MESHES:
         path = der.fold(
-            der.Scene(ring, R(h_over_t), n_edges=n_edges, stability=False, contacts=False)
+            der.Scene(ring, R(h_over_t), n_edges=n_edges, stability=False, self_crossings=False)
         )
         errors.append(curve_error(path.gamma, path.moment, path.energy, exact))
         assert len(path.folds) == len(exact.folds)
@@ -125,7 +125,7 @@ def test_a_user_s_profile_folds_as_its_boundary_value_problem_says():
     """
     errors = []
     for n_edges in (128, 256):
-        scene = der.Scene(egg(), R(4.0), n_edges=n_edges, contacts=False)
+        scene = der.Scene(egg(), R(4.0), n_edges=n_edges, self_crossings=False)
         path = der.fold(scene)
         assert path.mode is not None
         assert path.mode.foldable

@@ -39,7 +39,9 @@ SHAPES = [
 
 @functools.cache
 def folded(ring, h_over_t, **numerics):
-    return der.fold(der.Scene(ring, der.rectangular_section(h_over_t), contacts=False, **numerics))
+    return der.fold(
+        der.Scene(ring, der.rectangular_section(h_over_t), self_crossings=False, **numerics)
+    )
 
 
 # --- the index identity -------------------------------------------------------------------------
@@ -304,7 +306,7 @@ def test_a_ring_without_moment_at_pi_can_be_inside_out(ring, section, control):
     The curvature is the natural one less 4 pi/L, a total turning of -2 pi and the energy of the
     three-covered ring, 8 pi^2 alpha/L; a minimum with and without the grips. To rounding.
     """
-    path = der.fold(der.Scene(ring, section, contacts=False, control=control, shapes=True))
+    path = der.fold(der.Scene(ring, section, self_crossings=False, control=control, shapes=True))
     at = path.at_pi
     assert not path.mode.foldable
     assert abs(at.moment) < 1e-10

@@ -106,6 +106,7 @@ def test_json_has_the_entries_of_the_contract():
             "solver",
             "status",
             "message",
+            "reason",
             "ring",
             "section",
             "numerics",
@@ -139,6 +140,18 @@ def test_path_that_never_reached_pi_has_null_at_pi_and_mode():
 def test_file_without_status_is_a_done_path():
     """The contract lists neither status nor message: a file without them is complete."""
     assert Path.from_json(altered(status=..., message=...)).status == "done"
+
+
+def test_file_without_a_reason_has_none():
+    """Files that were written before the entry was there."""
+    assert Path.from_json(altered(reason=...)).reason == ""
+
+
+def test_reason_comes_back():
+    """By the name of the enum, not by its sentence."""
+    assert Path.from_json(path(reason="turned_back").to_json()).reason == "turned_back"
+    with pytest.raises(ValueError, match="reason must be one of"):
+        path(reason="gamma turns back")
 
 
 def test_path_survives_pickling():

@@ -26,7 +26,7 @@ def path(h_over_t: float, n_edges: int, shape: str = "auto") -> der.Path:
     until = "folded" if h_over_t == 1.0 else None
     section = der.rectangular_section(h_over_t)
     scene = der.Scene(
-        der.circle(), section, n_edges=n_edges, sector=shape, contacts=False, until=until
+        der.circle(), section, n_edges=n_edges, sector=shape, self_crossings=False, until=until
     )
     return der.fold(scene)
 

@@ -13,7 +13,7 @@ from rerun.chunk import RrdReader
 
 import der
 from der.analysis.landscape.landscape import landscape
-from der.analysis.landscape.surface import surface
+from der.analysis.landscape.surface import energy_surface
 from der.records.configurations import Fall, Shapes, Softest
 from der.records.path import Timing, counts
 from der.utils import files
@@ -561,7 +561,7 @@ def test_landscape_has_its_rests_barriers_and_the_present_state(tmp_path):
 def test_present_state_moves_on_the_surface(tmp_path):
     """Its places are those of the path of twisting: the same states on another mesh of gamma."""
     scene = landscape_scene(1.6)
-    ground = surface(scene, shape=(7, 6))
+    ground = energy_surface(scene, shape=(7, 6))
     save_landscape(landscape(scene), tmp_path / "s.rrd", surface=ground)
     read = Recording(tmp_path / "s.rrd")
     dots = np.array([row[0] for row in read.rows("/surface/now", "Points3D:positions").values()])

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import der
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.errors import NotConverged
 from validation.benchmark.rings import BenchRing, Known
 from validation.benchmark.rows import Trial, failed, finite, measured
 from validation.benchmark.stepping import stepped
 
-BARE: Mapping[str, object] = {"stability": False, "contacts": False}
+BARE: Mapping[str, object] = {"stability": False, "self_crossings": False}
 ROD: Mapping[str, Mapping[str, object]] = {
     "rod, sector": {},
     "rod, sector, index": {"stability": True},
@@ -50,11 +50,11 @@ def relaxation_trials(truth: Known, sizes: Sequence[int], repeats: int) -> Itera
 
 def bvp_trials(truth: Known, tolerances: Sequence[float], repeats: int) -> Iterator[Trial]:
     """The boundary-value solver over its tolerance."""
-    solve(truth.case.scene(), tolerance=1e-3)
+    solve_bvp(truth.case.scene(), tolerance=1e-3)
     for tolerance in tolerances:
 
         def work(tolerance: float = tolerance) -> der.Path:
-            return solve(truth.case.scene(), tolerance=tolerance)
+            return solve_bvp(truth.case.scene(), tolerance=tolerance)
 
         yield _path_trial(truth, "boundary value", f"{tolerance:.0e}", work, repeats)
 

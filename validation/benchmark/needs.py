@@ -26,14 +26,14 @@ from der.rod.planar_ring import covered, planar_ring
 from validation.benchmark.paths import circle
 from validation.benchmark.rows import Row, measured
 
-BARE: Mapping[str, object] = {"stability": False, "contacts": False}
+BARE: Mapping[str, object] = {"stability": False, "self_crossings": False}
 KEPT: Mapping[str, object] = {"shapes": True}
 TURNED: Mapping[str, object] = {"control": "angle", "unload": True}
 
 # name -> (h/t, what is wanted besides, what it is compared with)
 NEEDS: Mapping[str, tuple[float, Mapping[str, object], Mapping[str, object]]] = {
     "stability of every state": (4.0, {"stability": True}, {}),
-    "self-crossings": (4.0, {"contacts": True}, {}),
+    "self-crossings": (4.0, {"self_crossings": True}, {}),
     "error bars": (4.0, {"error_bars": True}, {}),
     "full ring": (4.0, {"sector": "full"}, {}),
     "half ring": (4.0, {"sector": "half"}, {}),

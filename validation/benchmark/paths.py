@@ -14,7 +14,7 @@ import der
 from der.analysis.loading import follow_angle
 from der.analysis.loading_by_relaxation import follow_relaxed
 from der.analysis.snap import Landing, snap
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.continuation.events import Visit, Wanted
 from der.continuation.step import Tally
 from der.rod.equilibrium import Equilibrium
@@ -65,9 +65,9 @@ def bvp_paths(repeats: int, rings: tuple[BenchRing, ...] = RINGS) -> Iterator[Ro
     """The boundary-value problem's paths at 1e-6 and at 1e-8."""
     for case in rings:
         for tolerance in (1e-6, 1e-8):
-            path = solve(case.scene(), tolerance=tolerance)
+            path = solve_bvp(case.scene(), tolerance=tolerance)
             seconds = cpu_time(
-                lambda case=case, tolerance=tolerance: solve(case.scene(), tolerance=tolerance),  # type: ignore[misc]
+                lambda case=case, tolerance=tolerance: solve_bvp(case.scene(), tolerance=tolerance),  # type: ignore[misc]
                 repeats,
             )
             goal = GOALS.get(case.name) if tolerance == 1e-6 else None

@@ -52,7 +52,7 @@ class Scale:
 def scale(n: int, repeats: int) -> Scale:
     """Measure N edges; paths above 4,096 edges are long enough to be timed once."""
     newton, residual, ring = _newton(n, repeats)
-    scene = circle(4.0, n_edges=n, stability=False, contacts=False)
+    scene = circle(4.0, n_edges=n, stability=False, self_crossings=False)
     path = measured(lambda: der.fold(scene), repeats if n <= 4096 else 1, warm=n <= 4096)
     iterations = path.result.timing.newton_iterations
     return Scale(n, newton, residual, _bytes(ring), path.cpu, path.memory or 0, iterations)

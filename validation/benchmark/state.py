@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import der
-from der.bvp.solve import FINEST, solve
+from der.bvp.solve import FINEST, solve_bvp
 from der.errors import NotConverged
 from validation.benchmark import elastica as bench_elastica
 from validation.benchmark.methods import BARE, RELAXED, STEPPING
@@ -40,7 +40,7 @@ def trials(
     """All methods; ``sizes`` by method, ``elements`` of PyElastica."""
     only: dict[str, object] = {"gamma_max": GAMMA, "save_at": (GAMMA,)}
     scene = CIRCLE.scene(**only)
-    exact = float(solve(scene, tolerance=FINEST).moment[-1])
+    exact = float(solve_bvp(scene, tolerance=FINEST).moment[-1])
 
     def trial(method: str, setting: str, work: Callable[[], float], times: int) -> Trial:
         slow = times == 1
@@ -59,7 +59,7 @@ def trials(
         yield trial(
             "boundary value",
             f"{tolerance:.0e}",
-            lambda tolerance=tolerance: _last(solve(scene, tolerance=tolerance)),  # type: ignore[misc]
+            lambda tolerance=tolerance: _last(solve_bvp(scene, tolerance=tolerance)),  # type: ignore[misc]
             repeats,
         )
     for tolerance in stepping:

@@ -22,7 +22,7 @@ import numpy as np
 
 import der
 from der.analysis.compare import compare
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.diagram.workers import Workers, workers
 from der.errors import NotConverged
 from der.geometry.ring import Ring
@@ -57,7 +57,7 @@ def scene(ring: Ring, section: Section, n: int) -> der.Scene:
         section,
         n_edges=n,
         stability=False,
-        contacts=False,
+        self_crossings=False,
         error_bars=True,
         save_at=(math.pi,),
     )
@@ -94,7 +94,7 @@ def solved(ring: Ring, section: Section, asked: float = ASKED) -> Swept:
     """Solve a ring's boundary-value problem to the tolerance asked for."""
     start = time.process_time()
     try:
-        path = solve(der.Scene(ring, section, save_at=(math.pi,)), tolerance=asked)
+        path = solve_bvp(der.Scene(ring, section, save_at=(math.pi,)), tolerance=asked)
     except NotConverged as failure:
         return Swept(0, None, time.process_time() - start, str(failure))
     intervals = int(str(path.numerics["intervals"]))

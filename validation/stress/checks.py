@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from der.errors import Reason
 from der.geometry.mesh import sites
 from der.records.configurations import Shapes
-from der.records.path import NEVER, Path, Point
+from der.records.path import Path, Point
 from der.scene import Scene
 from der.utils.checks import Array
 from validation.stress.random_rings import DENSE, LOOSE, largest_error, work_missing
@@ -56,7 +57,7 @@ def _start(path: Path) -> Iterator[Fault]:
 def _end(scene: Scene, path: Path) -> Iterator[Fault]:
     """A finished path ends where it was to end, and has been where it was to be solved for."""
     last = float(path.gamma[-1])
-    if path.message == NEVER:
+    if path.reason == Reason.TURNED_BACK.word:
         expected = {-scene.gamma_max}
     elif scene.unload:
         expected = {0.0}

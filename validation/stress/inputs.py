@@ -147,8 +147,16 @@ def _of_scenes() -> Iterator[Argument]:
     for name in ("gamma_max", "a_over_t", "tolerance"):
         yield _numbers("Scene", (name,), scene(name), **NOT_POSITIVE)
     yield _numbers("Scene", ("n_edges",), scene("n_edges"), odd=63, few=4, many=2**20)
-    for name in ("stability", "contacts", "error_bars", "shapes", "history", "modes", "unload"):
-        taken = ("bool", "numpy bool", *(("none",) if name == "contacts" else ()))
+    for name in (
+        "stability",
+        "self_crossings",
+        "error_bars",
+        "shapes",
+        "history",
+        "modes",
+        "unload",
+    ):
+        taken = ("bool", "numpy bool", *(("none",) if name == "self_crossings" else ()))
         wrong = {key: value for key, value in NEVER.items() if key not in taken}
         yield Argument("Scene", (name,), scene(name), wrong)
     for name in ("sector", "control", "solver", "curvature", "stretch", "until"):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import der
 import der.continuation.arclength
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.errors import NotConverged
 from der.geometry.section import Scale
 from der.kernels.assembly import assemble
@@ -22,7 +22,7 @@ from der.kernels.linking import link
 from der.records.configurations import Shapes
 from der.records.path import Path
 from der.rod.gripped_ring import sector
-from der.scene import CONTACTS_UP_TO, Scene
+from der.scene import CROSSINGS_UP_TO, Scene
 from der.utils.checks import Array
 from validation.stress.cases import ring_of, scene_of, section_of
 from validation.stress.checks import (
@@ -162,7 +162,7 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
     tolerance = max(scene.tolerance, 1e-8 if scene.solver == "relaxation" else 0.0)
     if scene.stretching and tolerance > LOOSEST:  # a gap, all in one edge, would be stretch
         return
-    links = scene.n_edges <= min(256, CONTACTS_UP_TO)
+    links = scene.n_edges <= min(256, CROSSINGS_UP_TO)
     worst = dict.fromkeys(("residual", "energy", "moment", "link"), 0.0)
     for k, (gamma, moment, energy) in enumerate(zip(*columns, strict=True)):
         quat = _quaternions(shapes.frames[k])
@@ -220,7 +220,7 @@ def _bvp(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     tolerance = parameters["bvp"]["tolerance"]
 
     def solver(scene: Scene) -> Path:
-        return solve(scene, tolerance=tolerance)
+        return solve_bvp(scene, tolerance=tolerance)
 
     try:
         path = solver(scene)
@@ -240,7 +240,7 @@ def _compare(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     another: finer ones are tried before the two are said to differ.
     """
     scene = _scene(parameters)
-    reference = solve(scene, tolerance=1e-9)
+    reference = solve_bvp(scene, tolerance=1e-9)
     found: list[Fault] = []
     for finer in (1, 2, 4):
         path = der.fold(replace(scene, n_edges=finer * scene.n_edges))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from der.bvp.solve import TOLERANCE, solve
+from der.bvp.solve import TOLERANCE, solve_bvp
 from der.errors import NotConverged
 from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
 from der.geometry.section import Section, rectangular_section
@@ -86,7 +86,7 @@ def survey(count: int, seed: int, tolerance: float = TOLERANCE) -> Survey:
     reached = 0
     for ring, section in islice(random_rings(count, seed), count):
         try:
-            path = solve(Scene(ring, section), tolerance=tolerance)
+            path = solve_bvp(Scene(ring, section), tolerance=tolerance)
         except NotConverged as failure:
             suspects.append(Suspect(ring, section, "not converged", str(failure)))
             seconds.append(failure.path.timing.solve_s)
@@ -108,7 +108,7 @@ def faults(ring: Ring, section: Section, path: Path, tolerance: float) -> Iterat
     missing = work_missing(path)
     if missing > LOOSE:  # are there too few states, or is the path broken?
         dense = tuple(np.linspace(0.0, math.pi, DENSE + 1))
-        missing = work_missing(solve(Scene(ring, section, save_at=dense), tolerance=tolerance))
+        missing = work_missing(solve_bvp(Scene(ring, section, save_at=dense), tolerance=tolerance))
         if missing > LOOSE:
             yield "work", f"U and the integral of 4 M dgamma differ by {missing:.2g} of U"
 

@@ -29,7 +29,7 @@ import numpy as np
 import der
 from der.analysis.snap import TO_AND_FRO
 from der.bvp import collocation
-from der.bvp.solve import solve
+from der.bvp.solve import solve_bvp
 from der.diagram.jobs import Jobs
 from der.diagram.workers import processes
 from der.diagram.workers import workers as started
@@ -199,7 +199,7 @@ def _load_kernels() -> None:
     for wants in ({}, {"control": "angle", "unload": True, "solver": "relaxation"}):
         der.fold(replace(scene, **wants))  # type: ignore[arg-type]
     der.fold(replace(scene, control="angle"))
-    solve(scene, tolerance=1e-6)
+    solve_bvp(scene, tolerance=1e-6)
 
 
 def _shown(line: str) -> None:

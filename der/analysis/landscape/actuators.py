@@ -86,9 +86,7 @@ def _places(rod: Rod, state: State, x: Array) -> Array:
 def _renumbered(alone: Alone, first: int) -> tuple[Rod, State]:
     """The same ring with edge ``first`` for edge 0."""
     rod, state = alone.rod, alone.state
-    rolled = rod._replace(
-        **{name: np.roll(getattr(rod, name), -first, axis=0) for name in _ROLLED}
-    )
+    rolled = rod._replace(**{name: np.roll(getattr(rod, name), -first, axis=0) for name in _ROLLED})
     return rolled, state.but(
         quat=np.roll(state.quat, -first, axis=0), stretch=np.roll(state.stretch, -first)
     )

@@ -24,7 +24,7 @@ from der.analysis.landscape.rest_states import with_rests
 from der.analysis.landscape.saddle_search import climb, downhill_modes
 from der.continuation.arclength import follow
 from der.continuation.events import Point, Wanted, three_covered, point
-from der.continuation.richardson import extrapolated
+from der.continuation.richardson import limits
 from der.continuation.step import ContinuationFailed, Statistics
 from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation_vector
@@ -54,7 +54,7 @@ class _Found:
     sides: tuple[EndState, ...]
 
 
-def free_barrier(scene: Scene) -> Pass:
+def barrier(scene: Scene) -> Pass:
     """The lowest way found between the flat and the folded ring, left alone in space.
 
     Parameters
@@ -73,7 +73,7 @@ def free_barrier(scene: Scene) -> Pass:
             coarse = [_pass(replace(scene, n_edges=n, error_bars=False), pressed) for n in coarser]
             if not pressed:
                 heights = [{"fold": level.fold, "open": level.open} for level in (one, *coarse)]
-                one = replace(one, extrapolated=extrapolated(heights))
+                one = replace(one, extrapolated=limits(heights))
     return one
 
 

@@ -18,7 +18,7 @@ from der.analysis.full_ring import shapes
 from der.analysis.landscape.rest_states import with_rests
 from der.continuation.arclength import follow
 from der.continuation.events import Point, Wanted, full_index, three_covered, point
-from der.continuation.richardson import Extrapolated, extrapolated
+from der.continuation.richardson import Extrapolated, limits
 from der.continuation.step import ContinuationFailed, Statistics
 from der.errors import STOPPED
 from der.geometry.mesh import sites
@@ -80,7 +80,9 @@ def landscape(
                 points[k] = visit(ring, exact, points[k].solution, kind=points[k].kind)
         rests = tuple(rest_of(ring, whole, points[k], k) for k in at)
         folded = bool(points) and status == "done" and three_covered(ring, points[-1].solution)
-        timing = Timing(time.perf_counter() - started, statistics.newton_iterations, statistics.steps)
+        timing = Timing(
+            time.perf_counter() - started, statistics.newton_iterations, statistics.steps
+        )
         path = _path(scene, ring, points, timing, status, message)
         found = Landscape(path, rests, folded, barriers(rests, folded=folded, message=message))
         bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
@@ -90,10 +92,10 @@ def landscape(
             landscape(replace(bare, n_edges=n), index_free=False) for n in coarser if not pressed
         ]
     if pressed:
-        return replace(found, path=replace(path, status="interrupted", message=STOPPED))
+        return replace(found, path=path.interrupted())
     if not extrapolates:
         return found
-    return _without_mesh(found, extrapolated([_heights(one) for one in (found, *coarse)]))
+    return _without_mesh(found, limits([_heights(one) for one in (found, *coarse)]))
 
 
 def _heights(one: Landscape) -> dict[str, float | None]:
@@ -169,7 +171,10 @@ def distance(ring: GrippedRing, at: Equilibrium) -> float:
 
 
 def _followed(
-    ring: GrippedRing, wanted: Wanted, statistics: Statistics, progress: Callable[[float], object] | None
+    ring: GrippedRing,
+    wanted: Wanted,
+    statistics: Statistics,
+    progress: Callable[[float], object] | None,
 ) -> tuple[list[Point], str, str]:
     """The path as far as it goes, its status and a sentence about it."""
     points: list[Point] = []
@@ -202,7 +207,12 @@ def rest_of(ring: GrippedRing, whole: GrippedRing | None, one: Point, position: 
 
 
 def _path(
-    scene: Scene, ring: GrippedRing, points: Sequence[Point], timing: Timing, status: str, message: str
+    scene: Scene,
+    ring: GrippedRing,
+    points: Sequence[Point],
+    timing: Timing,
+    status: str,
+    message: str,
 ) -> Path:
     """The record of what was visited."""
     supports = [total_index(ring, one.index) for one in points]

@@ -15,10 +15,10 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from der.analysis.landscape.barrier import free_barrier, twisted_rests
+from der.analysis.landscape.barrier import barrier, twisted_rests
 from der.analysis.landscape.landscape import numerics, scene_sector
 from der.analysis.landscape.opening_search import Search, refine, scan
-from der.continuation.richardson import Extrapolated, extrapolated
+from der.continuation.richardson import Extrapolated, limits
 from der.records.landscape import Pass
 from der.records.opening import LeastPush
 from der.scene import Scene, meshes
@@ -61,7 +61,7 @@ def least_push(
     started = time.perf_counter()
     grid = _grid(scene, points)
     with interrupts_between_states() as pressed:
-        alone = free_barrier(replace(scene, error_bars=False))
+        alone = barrier(replace(scene, error_bars=False))
         search, why = _begun(scene, alone)
         status = alone.status
         if search is not None and not pressed:
@@ -141,7 +141,7 @@ def _without_mesh(search: Search, alone: Pass) -> Extrapolated:
             return {}
         coarse.most = np.inf
         levels.append(_works(search, coarse, times))
-    return extrapolated(levels)
+    return limits(levels)
 
 
 def _works(search: Search, level: Search, times: int) -> dict[str, float | None]:

@@ -201,7 +201,9 @@ def _let_go(done: March, ring: GrippedRing, one: Point) -> State | None:
     return landed.state
 
 
-def _carried_over(done: March, ring: GrippedRing, came: Equilibrium, at: Equilibrium) -> State | None:
+def _carried_over(
+    done: March, ring: GrippedRing, came: Equilibrium, at: Equilibrium
+) -> State | None:
     """Let the ring go just past a pass, further along the way it came; the march has ended."""
     free = done.tool.let_go(at.state)
     index = balance(done.tool.rod, free.quat, free.stretch).index()
@@ -239,13 +241,17 @@ def _branched(done: March, ring: GrippedRing, at: Equilibrium) -> EndState:
     _, (mode,) = softest_modes(rod, supports, all_modes(supports), at.state)
     size = _KICK / float(np.sqrt(np.sum(rod.mass * mode**2)))
     ways = [ring.heading(0.0)._replace(q=sign * size * mode) for sign in (1.0, -1.0)]
-    lower = min(ways, key=lambda way: on_the_conditions(rod, supports, moved(supports, past, way)).energy)
+    lower = min(
+        ways, key=lambda way: on_the_conditions(rod, supports, moved(supports, past, way)).energy
+    )
     return flow(rod, supports, past, kick=lower, tolerance=_AT_REST)
 
 
 def _under_dead_load(done: March, ring: GrippedRing, limit: Moment, start: State) -> Moment:
     """The limit of a dead load, with where the ring rests that falls under it and is let go."""
-    fall = flow(ring, start,
+    fall = flow(
+        ring,
+        start,
         moment=limit.force,
         stops=(-np.inf, done.tool.load_max),
         tolerance=_AT_REST,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from der.analysis.landscape.barrier import free_barrier
+from der.analysis.landscape.barrier import barrier
 from der.analysis.landscape.landscape import landscape
 from der.continuation.richardson import Extrapolated
 from der.geometry.ring import Ring
@@ -52,7 +52,7 @@ def barriers_over(
             scene = Scene(ring, section, n_edges=n_edges, stability=False, error_bars=error_bars)
             one = landscape(scene)
             sentences = set(one.barriers.why.values())
-            found = free_barrier(scene) if free else None
+            found = barrier(scene) if free else None
             if found is not None:
                 sentences |= {found.why} - {""}
             rows.append((value, *_twisting(one), *_alone(found)))

@@ -39,7 +39,9 @@ def with_rests(
             if before.moment * one.solution.moment < 0.0:
                 rests.append(len(line))
                 line.append(
-                    visit(ring, wanted, without_moment(ring, wanted, statistics, before, one.solution))
+                    visit(
+                        ring, wanted, without_moment(ring, wanted, statistics, before, one.solution)
+                    )
                 )
         if here:
             rests.append(len(line))

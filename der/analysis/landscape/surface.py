@@ -43,7 +43,7 @@ _SHAKES = 6  # cells in each direction from which minima apart from the rest are
 _KEPT = 12  # gradients between kept configurations of a snap
 
 
-def surface(
+def energy_surface(
     scene: Scene,
     *,
     shape: tuple[int, int] = (60, 60),
@@ -227,7 +227,9 @@ def _reasons(flood: Flood, status: str) -> dict[Cell, str]:
     }
 
 
-def _snaps(ring: GrippedRing, wanted: Wanted, angles: Array, pressed: list[int]) -> tuple[Array, ...]:
+def _snaps(
+    ring: GrippedRing, wanted: Wanted, angles: Array, pressed: list[int]
+) -> tuple[Array, ...]:
     """Gamma, distance and energy along every snap on the way to the last angle and back."""
     asked = replace(wanted, load_max=float(angles[-1]), until_folded=False, targets=())
     found: list[Array] = []

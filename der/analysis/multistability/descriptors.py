@@ -15,7 +15,7 @@ from der.kernels.quaternions import Array, rotation
 from der.records.states import RingState
 from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State, edges
-from der.scene import CONTACTS_UP_TO
+from der.scene import CROSSINGS_UP_TO
 
 _FLAT = 1e-6  # a, out of the plane; rad, of strains that are zero
 _TILT = 1e-3  # rad, of the bar in a circle
@@ -31,7 +31,7 @@ def described(whole: GrippedRing, one: Known, name: str, index: int | None) -> R
     simple = covering is None or abs(covering) == 1
     linked, writhe = None, None
     turns = float(twist(state.quat))
-    if simple and rod.n_edges <= CONTACTS_UP_TO:
+    if simple and rod.n_edges <= CROSSINGS_UP_TO:
         linked = link(state.quat, whole.lengths(state))[0]
         writhe = linked - turns
     slides = images(rod, alone.supports, state.load).slides

@@ -82,7 +82,9 @@ def _landed(here: Alone, push: Array, images: Images) -> Known | None:
     """The equilibrium in which the flow from a push ends; None where it does not."""
     size = _NUDGE * math.sqrt(float(here.rod.length.sum()))
     kick = Direction(size * push, np.zeros(len(here.supports.target)), 0.0)
-    fall = flow(here.rod, here.supports, here.state, kick=kick, tolerance=_TOLERANCE, most=_MOST_STEPS)
+    fall = flow(
+        here.rod, here.supports, here.state, kick=kick, tolerance=_TOLERANCE, most=_MOST_STEPS
+    )
     if not fall.rests:
         return None
     state = fall.state

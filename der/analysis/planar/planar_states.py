@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from der.continuation.richardson import romberg
+from der.continuation.richardson import limit
 from der.errors import STOPPED
 from der.kernels.planar import Array, negative_planar
 from der.records.planar import FOLDED, PlanarState, PlanarStates
@@ -258,7 +258,7 @@ def _sure(levels: list[float]) -> tuple[float, float | None]:
     """Extrapolated value and error, where all three meshes have one."""
     if len(levels) < 3:
         return levels[0], None
-    return romberg(*levels)
+    return limit(*levels)
 
 
 def _index(mesh: PlanarRing, one: Found) -> tuple[int | None, int]:

@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from der.analysis.planar.planar_states import check_planar, coarser, planar_numerics
-from der.continuation.richardson import romberg
+from der.continuation.richardson import limit
 from der.errors import STOPPED
 from der.kernels.planar import Array, PlanarRod
 from der.records.planar import Squeeze, SqueezePoint
@@ -162,7 +162,7 @@ def _extrapolated(track: _Track, stops: list[Stop], goal: float, scene: Scene) -
         if len(same) < len(levels):
             continue
         for c in range(3):
-            values[k, c], errors[k, c] = romberg(values[k, c], same[0][c], same[1][c])
+            values[k, c], errors[k, c] = limit(values[k, c], same[0][c], same[1][c])
     return _Columns(values, errors)
 
 

@@ -10,8 +10,6 @@ iterations, folds or not, if its corrections stay in the plane normal to the pat
 
 What is sought (a gamma that was asked for, a fold, a limit) is a root, along the path of N edges,
 of the extrapolated curve.
-
-Sources: Richardson (1911), Phil. Trans. A 210; Romberg (1955), K. Norske Vid. Selsk. Forh. 28.
 """
 
 from __future__ import annotations
@@ -23,17 +21,16 @@ from typing import NamedTuple
 import numpy as np
 
 from der.analysis.mesh_transfer import Restricted, restricted
-from der.continuation.events import Point
+from der.continuation.richardson import romberg
 from der.kernels.quaternions import Array
-from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
+from der.problem import PLANE, Point
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 
 LEVELS = 3
 GAMMA, MOMENT, ENERGY = 0, 1, 2  # columns of a table of values
 RATE = 3  # added to these: columns of the rates along the path
 
-# weights of the values at h, 2h and 4h: (4, -1)/3 for one term, and (16, -1)/15 of two such
-_ROMBERG = np.array([[1.0, 0.0, 0.0], [4.0 / 3.0, -1.0 / 3.0, 0.0], [64 / 45, -20 / 45, 1 / 45]])
 _PROBE = 1e-3  # of s: the first step towards a fold or limit, whose second derivative is not known
 _SMALL = 1e-6  # of s: a step that is as good as its linear prediction, to the square of this
 FARTHEST = 0.3  # of s: about two steps of the path; what is sought lies h^2 away
@@ -57,8 +54,7 @@ class Family:
 
     def values(self, level: int, at: Equilibrium) -> tuple[float, float, float]:
         """Return gamma [rad], M of one arm [GJ/a] and U of the full ring [GJ/a]."""
-        ring = self.rings[level]
-        return at.state.load, ring.moment(at.moment), ring.copies * at.energy
+        return self.rings[level].values(at)
 
     def matched(self, fine: Equilibrium, near: Restricted | None = None) -> Matched | None:
         """The states matched to one on the finest mesh; None where a level has none.
@@ -71,10 +67,13 @@ class Family:
         table = np.array(
             [
                 self._line(0, fine, 1.0, 0.0),
-                *(self._line(k, x.solution, x.speed, x.beyond) for k, x in enumerate(found, start=1)),
+                *(
+                    self._line(k, x.solution, x.speed, x.beyond)
+                    for k, x in enumerate(found, start=1)
+                ),
             ]
         )
-        residual = max(fine.residual, found.half.solution.residual, found.quarter.solution.residual)
+        residual = max(fine.residual, *(x.solution.residual for x in found))
         return Matched(table, residual, found)
 
     def _line(self, level: int, at: Equilibrium, speed: float, beyond: float) -> list[float]:
@@ -84,7 +83,7 @@ class Family:
         """
         values = self.values(level, at)
         gamma_rate = speed * at.parameter_rate
-        moment_rate = speed * self.rings[level].moment(at.moment_rate)
+        moment_rate = speed * self.rings[level].arm_moment(at.moment_rate)
         rates = (gamma_rate, moment_rate, 4.0 * values[MOMENT] * gamma_rate)
         return [v - beyond * r for v, r in zip(values, rates, strict=True)] + list(rates)
 
@@ -99,23 +98,16 @@ class Family:
     def beside(self, base: Equilibrium, s: float) -> Equilibrium | None:
         """The state on the finest mesh at the distance ``s`` from another; None without one."""
         ring, t = self.rings[0], base.tangent
-        at = ring.correct(ring.retract(base.state, Direction(s * t.q, s * t.force, s * t.load)),
-            along=t,
-            hold=PLANE,
-            tolerance=self.tolerance,
-        )
+        start = ring.retract(base.state, s * t)
+        at = ring.correct(start, along=t, hold=PLANE, tolerance=self.tolerance)
         return at if at.converged else None
 
 
-def romberg(levels: Array) -> Array:
-    """Values at h, the same less their h^2 term, and less their h^4 term: (3, ...) as ``levels``.
+@dataclass(frozen=True)
+class SoughtPoint(Point[Equilibrium]):
+    """A point that stands for a gamma on the extrapolated curve, on one side of a fold of it."""
 
-    Parameters
-    ----------
-    levels : (3, ...) values at h, 2h and 4h, with errors in even powers of h.
-    """
-    extrapolated: Array = _ROMBERG @ levels
-    return extrapolated
+    sought: tuple[float, float] = (0.0, 0.0)  # that gamma, and the sign of dgamma/ds there
 
 
 @dataclass(frozen=True)
@@ -146,10 +138,10 @@ class Goal(NamedTuple):
     direction: float  # where gamma is sought: sign of dgamma/ds on this side of a fold
 
 
-def _goal(point: Point, asked: Collection[float]) -> Goal | None:
-    """What a visited state stands for; None: for nothing but a place on the curve."""
+def _goal(point: Point[Equilibrium], asked: Collection[float]) -> Goal | None:
+    """What a point stands for; None: for nothing but a place on the curve."""
     load = point.solution.parameter
-    if point.sought is not None:
+    if isinstance(point, SoughtPoint):
         return Goal(GAMMA, *point.sought)
     if point.kind == "fold":
         return Goal(RATE + GAMMA, 0.0, 0.0)
@@ -161,9 +153,9 @@ def _goal(point: Point, asked: Collection[float]) -> Goal | None:
 
 
 def placed(
-    family: Family, points: Sequence[Point], asked: Collection[float]
+    family: Family, points: Sequence[Point[Equilibrium]], asked: Collection[float]
 ) -> Iterator[Place | None]:
-    """Where visited states belong on the extrapolated curve; None where a level has no state."""
+    """Where points belong on the extrapolated curve; None where a level has no state."""
     near = None
     for point in points:
         here = family.matched(point.solution, near)
@@ -171,8 +163,10 @@ def placed(
         near = None if here is None else here.coarse
 
 
-def _placed(family: Family, point: Point, here: Matched, asked: Collection[float]) -> Place | None:
-    """Where a visited state belongs, ``here`` being matched to it."""
+def _placed(
+    family: Family, point: Point[Equilibrium], here: Matched, asked: Collection[float]
+) -> Place | None:
+    """Where a point belongs, ``here`` being matched to it."""
     goal = _goal(point, asked)
     if goal is not None:
         return _sought(family, point.solution, here, goal)

@@ -17,15 +17,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from der.analysis.matching import FARTHEST, GAMMA, Family, Place, placed, romberg
-from der.continuation.events import Point, Wanted, point
-from der.continuation.interpolant import between
+from der.analysis.extrapolated_curve import FARTHEST, GAMMA, Family, Place, SoughtPoint, placed
+from der.analysis.request import Request
+from der.continuation.richardson import romberg
 from der.kernels.quaternions import Array
-from der.rod.equilibrium import dot
+from der.problem import Point
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 
 
-def arc_lengths(ring: GrippedRing, points: Sequence[Point]) -> Array:
+def arc_lengths(ring: GrippedRing, points: Sequence[Point[Equilibrium]]) -> Array:
     """Distances (n,) of the points from the first, along chords, in the norm of the path."""
     steps = [0.0] * bool(points)
     for a, b in pairwise(one.solution.state for one in points):
@@ -35,17 +36,17 @@ def arc_lengths(ring: GrippedRing, points: Sequence[Point]) -> Array:
 
 
 def all_asked(
-    family: Family, wanted: Wanted, points: Sequence[Point], asked: Collection[float]
-) -> list[Point]:
+    family: Family, request: Request, points: Sequence[Point[Equilibrium]], asked: Collection[float]
+) -> list[Point[Equilibrium]]:
     """The points with those put in, and taken out, that moving folds pass over, in path order.
 
     Parameters
     ----------
-    points : the path on the finest mesh, from `path.follow`.
+    points : the path on the finest mesh, from `Request.follow`.
     asked : values of gamma that states were solved for [rad]. Those at which a path ends, or is
         judged (pi), are left as they are.
     """
-    asked = [load for load in asked if abs(load) not in (math.pi, wanted.load_max)]
+    asked = [load for load in asked if abs(load) not in (math.pi, request.gamma_max)]
     lengths = arc_lengths(family.rings[0], points).tolist()
     line = dict(enumerate(zip(lengths, points, strict=True)))
     folds = [k for k, one in enumerate(points) if one.kind == "fold"]
@@ -58,7 +59,7 @@ def all_asked(
         passed = [load for load in asked if min(old, new) < load < max(old, new)]
         if (new - old) * bend < 0.0:
             for load in passed:
-                for s, one in _reached(family, wanted, points[k], place, bend, load):
+                for s, one in _reached(family, request, points[k], place, bend, load):
                     line[len(line)] = (lengths[k] + s, one)
             continue
         for j in range(before + 1, after):
@@ -68,8 +69,13 @@ def all_asked(
 
 
 def _reached(
-    family: Family, wanted: Wanted, fold: Point, place: Place, bend: float, load: float
-) -> Iterator[tuple[float, Point]]:
+    family: Family,
+    request: Request,
+    fold: Point[Equilibrium],
+    place: Place,
+    bend: float,
+    load: float,
+) -> Iterator[tuple[float, Point[Equilibrium]]]:
     """Distances from a fold, and states on N edges, of the two that are at ``load`` once it moves.
 
     ``bend`` is d2gamma/ds2 of the extrapolated curve there; a state is left out where a mesh has
@@ -80,7 +86,10 @@ def _reached(
         s = place.s + side * away
         at = family.beside(fold.solution, s) if abs(s) < FARTHEST else None
         if at is not None:
-            found = visit(family.rings[0], wanted, at, sought=(load, side * bend))
+            regular = request.point(family.rings[0], at)
+            found = SoughtPoint(
+                at, "", regular.index, regular.stiffness, sought=(load, side * bend)
+            )
             (there,) = placed(family, [found], ())
             if there is not None:
                 yield s, found

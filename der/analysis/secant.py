@@ -1,16 +1,16 @@
-"""The last states of a march by dynamic relaxation, and where they lead.
+"""Secant predictor of loading by dynamic relaxation.
 
-A march without a Hessian knows its path by differences alone: up to three states in a row. A state
-goes on from them if it lies where they lead, and if its energy is theirs and the work in between.
+Without a Hessian the path is known by differences alone, of up to three states in a row. A state
+continues them if it lies where they lead, and if its energy is theirs and the work in between.
 """
 
 from __future__ import annotations
 
 import math
 
-from der.analysis.snap import heading
-from der.continuation.interpolant import between
-from der.rod.equilibrium import Direction, Equilibrium, Outcome, dot, moved
+from der.errors import Reason
+from der.problem import Increment
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed
 from der.rod.rod import State
@@ -26,24 +26,22 @@ _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 def ahead(ring: GrippedRing, trail: list[Equilibrium], load: float) -> State:
     """State at ``load`` extrapolated from the last three, or as many as there are."""
     here = trail[-1]
-    rise = load - here.state.load
-    rate = ring.heading(1.0)
+    rise = load - here.parameter
+    rate = ring.increment(load=1.0)
     if len(trail) > 1:
-        rate = _per_load(here)
+        rate = _per_load(ring, here)
     if len(trail) > 2:
-        older = _per_load(trail[-2])
+        older = _per_load(ring, trail[-2])
         # rates are means over their steps: from the middle of the last two to that of the next
-        span = 0.5 * (here.state.load - trail[-3].state.load)
-        lead = 0.5 * (load - trail[-2].state.load) / span
-        rate = rate._replace(q=rate.q + lead * (rate.q - older.q))
-    return ring.retract(here.state, Direction(rise * rate.q, 0.0 * rate.force, rise)).but(
-        load=load
-    )
+        span = 0.5 * (here.parameter - trail[-3].parameter)
+        lead = 0.5 * (load - trail[-2].parameter) / span
+        rate = rate + lead * (rate - older)
+    return ring.retract(here.state, rise * rate).but(load=load)
 
 
-def _per_load(at: Equilibrium) -> Direction:
+def _per_load(ring: GrippedRing, at: Equilibrium) -> Increment:
     """Mean rate of change over the last step, per unit of load."""
-    return Direction(at.tangent.q / at.parameter_rate, 0.0 * at.tangent.force, 1.0)
+    return ring.displacement(at.tangent, 1.0 / at.parameter_rate)
 
 
 def went_on(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> bool:
@@ -59,14 +57,14 @@ def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
     is the greatest so far.
     """
     before = trail[-1]
-    rise = found.state.load - before.state.load
+    rise = found.state.load - before.parameter
     if rise == 0.0:
         return True
-    known = [(at.state.load, at.moment) for at in trail]
+    known = [(at.parameter, at.moment) for at in trail]
     known.append((found.state.load, found.moment))
     mean = 0.0  # of a cubic, by two points of Gauss's
     for place in _GAUSS:
-        load = before.state.load + place * rise
+        load = before.parameter + place * rise
         for x, moment in known:
             mean += 0.5 * moment * math.prod((load - y) / (x - y) for y, _ in known if y != x)
     lost = abs(found.energy - before.energy - rise * mean)
@@ -74,33 +72,35 @@ def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
 
 
 def rested(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> Equilibrium:
-    """A relaxed state as an equilibrium: its rates are differences along the trail behind it."""
-    tangent, slope = ring.heading(1.0), 0.0
+    """Return a relaxed state as an equilibrium: its rates are differences along the trail."""
+    tangent, slope = ring.increment(load=1.0), 0.0
     if trail:
         last = trail[-1]
         step = ring.difference(last.state, found.state)
-        norm = math.sqrt(ring.inner(step, step))
+        rise = float(step[-1])
         tangent, slope = last.tangent, last.slope  # where the two are one state
-        apart = abs(step.load) > CLOSE
+        apart = abs(rise) > CLOSE
         if apart:
-            tangent = Direction(step.q / norm, step.force / norm, step.load / norm)
-            slope = (found.moment - last.moment) / step.load
+            tangent = step / math.sqrt(ring.inner(step, step))
+            slope = (found.moment - last.moment) / rise
         if apart and len(trail) > 1:
             before = trail[-2]
-            older = (last.moment - before.moment) / (last.state.load - before.state.load)
-            slope += step.load * (slope - older) / (found.state.load - before.state.load)
+            older = (last.moment - before.moment) / (last.parameter - before.parameter)
+            slope += rise * (slope - older) / (found.state.load - before.parameter)
+    rate = float(tangent[-1])
     return Equilibrium(
-        found.state,
-        Reason.CONVERGED,
-        -1,
-        0,
-        found.residual,
-        found.energy,
-        found.moment,
-        tangent,
-        slope * tangent.load,
-        -1,
-        0.0,
+        state=found.state,
+        parameter=found.state.load,
+        tangent=tangent,
+        observables={
+            "moment": (found.moment, slope * rate),
+            "energy": (found.energy, found.moment * rate),
+        },
+        index=None,
+        reason=Reason.CONVERGED,
+        detail="",
+        iterations=0,
+        residual=found.residual,
     )
 
 
@@ -109,9 +109,9 @@ def longer(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> list[
 
     What the next step is extrapolated from would otherwise be differences of next to nothing.
     """
-    step = abs(found.state.load - trail[-1].state.load)
+    step = abs(found.state.load - trail[-1].parameter)
     if step <= CLOSE:
         return trail
-    if len(trail) > 1 and step < _SHORTER * abs(trail[-1].state.load - trail[-2].state.load):
+    if len(trail) > 1 and step < _SHORTER * abs(trail[-1].parameter - trail[-2].parameter):
         trail = trail[:-1]
     return [*trail[-2:], rested(ring, trail, found)]
