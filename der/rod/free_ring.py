@@ -84,15 +84,25 @@ class FreeRing:
                 rows.append(mode)
         return places
 
+    @property
+    def system(self) -> RodSystem:
+        """The ring without its motions at no cost."""
+        return RodSystem(self.rod, self.pinned())
+
+    @property
+    def unpinned(self) -> RodSystem:
+        """The ring with all motions that its supports leave free."""
+        return RodSystem(self.rod, self.supports)
+
     def index(self) -> int | None:
         """Return the index, motions at no cost not counted; None: no equilibrium, or singular."""
         if not self.balanced:
             return None
-        return RodSystem(self.rod, self.pinned()).index(self.state)
+        return self.system.index(self.state)
 
     def polished(self, tolerance: float = 1e-10) -> Equilibrium:
         """Return the equilibrium next to it, by Newton's method."""
-        return RodSystem(self.rod, self.pinned()).correct(self.state, tolerance=tolerance)
+        return self.system.correct(self.state, tolerance=tolerance)
 
 
 def index_without_grips(

@@ -1,4 +1,4 @@
-"""What pushes a ring open that nothing holds: a strut between two of its points, or two wrenches.
+"""Actuators that open a free ring: a strut between two of its points, or two wrenches.
 
 Loads on a ring that floats in space balance each other, whatever it does:
 
@@ -10,7 +10,7 @@ Loads on a ring that floats in space balance each other, whatever it does:
              axis; what keeps the other two directions is a couple, too. No force acts.
 
 In both the load is what is prescribed: a length, or an angle. Its conjugate dL/dload is the force
-or the couple, dU is its work, and a state's index is that of the ring in its tool, supports.
+or the couple, dU is its work, and a state's index is that of the ring in its actuator, supports.
 
 The ring is renumbered so that the first point is edge 0, whose frame is supports: by the wrench, or to
 take out rigid rotations. With a strut, it is cut there and stands at both ends of an open rod, in
@@ -26,12 +26,12 @@ import numpy as np
 from der.kernels.assembly import assemble
 from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation
-from der.rod.equilibrium import equilibrium
-from der.rod.free_ring import Alone
-from der.rod.gripped_ring import E1, E2, E3, GrippedRing, free_ring
+from der.rod.free_ring import FreeRing
+from der.rod.gripped_ring import E1, E2, E3, free_supports
+from der.rod.manifold import split
 from der.rod.rod import Rod, State
-from der.rod.stability import all_modes
-from der.rod.supports import Supports, supports
+from der.rod.supports import supported
+from der.rod.system import RodSystem
 
 APART, TOGETHER, OUT = "apart", "together", "out of plane"
 LIFTED = (
@@ -44,21 +44,22 @@ _ROUND = 2.0 * np.pi  # rad, the most that a wrench turns
 
 
 @dataclass(frozen=True)
-class Tool:
-    """A ring in a tool that is about to be used."""
+class Actuator:
+    """A ring in an actuator that is about to be used."""
 
     kind: str  # "force" or "couple"
     points: tuple[int, int]  # edges of the ring whose middles it is put to
     direction: str  # in a word or two
     axis: Array  # (3,) in which the second point is pushed, or about which it is turned
-    ring: GrippedRing  # the ring in the tool; its start is at load 0
+    system: RodSystem  # the ring in the actuator; its load is the push
+    start: State  # at load 0
     first: float  # length of a strut at load 0, a; 0 for wrenches
     sense: float  # 1: the load lengthens, or turns to the right about the axis
-    load_max: float  # at which the tool has no more room
+    load_max: float  # at which the actuator has no more room
     rod: Rod  # of the ring without it
 
-    def let_go(self, state: State) -> State:
-        """A state of the ring in the tool, without it: no equilibrium in general."""
+    def released(self, state: State) -> State:
+        """A state of the ring in the actuator, without it: no equilibrium in general."""
         n, first = self.rod.n_edges, self.points[0]
         return State(
             np.roll(state.quat[:n], first, axis=0),
@@ -68,8 +69,8 @@ class Tool:
         )
 
     def shape(self, state: State) -> tuple[Array, Array]:
-        """Vertices (N, 3) of the ring in the tool, and the two points (2, 3) it is put to."""
-        free = self.let_go(state)
+        """Vertices (N, 3) of the ring in the actuator, and the two points (2, 3) it is put to."""
+        free = self.released(state)
         x = vertices(free.quat, self.rod.length * (1.0 + free.stretch))
         return x, _places(self.rod, free, x)[list(self.points)]
 
@@ -83,9 +84,9 @@ def _places(rod: Rod, state: State, x: Array) -> Array:
     return np.asarray(x - before[:, None] * rotation(state.quat)[:, :, 2])
 
 
-def _renumbered(alone: Alone, first: int) -> tuple[Rod, State]:
+def _renumbered(free: FreeRing, first: int) -> tuple[Rod, State]:
     """The same ring with edge ``first`` for edge 0."""
-    rod, state = alone.rod, alone.state
+    rod, state = free.rod, free.state
     rolled = rod._replace(**{name: np.roll(getattr(rod, name), -first, axis=0) for name in _ROLLED})
     return rolled, state.but(
         quat=np.roll(state.quat, -first, axis=0), stretch=np.roll(state.stretch, -first)
@@ -95,22 +96,16 @@ def _renumbered(alone: Alone, first: int) -> tuple[Rod, State]:
 _ROLLED = ("cell", "length", "mass", "rest")
 
 
-def _piece(rod: Rod, supports: Supports, start: State) -> GrippedRing:
-    return GrippedRing(
-        "full", 1, rod, supports, start, {"all": (1, all_modes(supports))}, np.zeros(rod.n_edges)
-    )
-
-
 # --- Struts ----------------------------------------------------------------------------------
 
 
-def struts(alone: Alone, points: tuple[int, int]) -> list[Tool]:
+def struts(free: FreeRing, points: tuple[int, int]) -> list[Actuator]:
     """A strut between two points, made longer, and made shorter where there is any length.
 
     Where the points lie in each other a strut may start in the three directions in which the ring
     yields in the direction of the push: eigenvectors of its compliance.
     """
-    rod, state = _renumbered(alone, points[0])
+    rod, state = _renumbered(free, points[0])
     far = (points[1] - points[0]) % rod.n_edges
     weight = _way(rod, far)
     length = rod.length * (1.0 + state.stretch)
@@ -120,16 +115,16 @@ def struts(alone: Alone, points: tuple[int, int]) -> list[Tool]:
     along = np.cumsum(rod.cell)[far - 1]
     taut = _TAUT * float(min(along, around - along))
     if first > _ONE_PLACE * around:
-        longer = _strutted(alone, points, chord / first, first, 1.0, taut - first, APART)
+        longer = _strutted(free, points, chord / first, first, 1.0, taut - first, APART)
         shorter = _strutted(
-            alone, points, chord / first, first, -1.0, (1.0 - _MET) * first, TOGETHER
+            free, points, chord / first, first, -1.0, (1.0 - _MET) * first, TOGETHER
         )
         return [longer, shorter] if taut > first else [shorter]
     first = LIFTED * around
-    normal = _normal(alone.state)
+    normal = _normal(free.state)
     return [
         _strutted(
-            alone,
+            free,
             points,
             axis,
             first,
@@ -137,7 +132,7 @@ def struts(alone: Alone, points: tuple[int, int]) -> list[Tool]:
             taut - first,
             OUT if abs(float(axis @ normal)) > 0.9 else APART,
         )
-        for axis in _yielding(alone, points)
+        for axis in _yielding(free, points)
     ]
 
 
@@ -151,15 +146,15 @@ def _way(rod: Rod, far: int) -> Array:
 
 
 def _strutted(
-    alone: Alone,
+    free: FreeRing,
     points: tuple[int, int],
     axis: Array,
     first: float,
     sense: float,
     load_max: float,
     direction: str,
-) -> Tool:
-    ring, state = _renumbered(alone, points[0])
+) -> Actuator:
+    ring, state = _renumbered(free, points[0])
     n, far = ring.n_edges, (points[1] - points[0]) % ring.n_edges
     length = np.concatenate([ring.length, [0.5 * ring.cell[-1], first]])
     length[0] = 0.5 * ring.cell[0]
@@ -171,22 +166,23 @@ def _strutted(
     placed[:n] = _way(ring, far)
     placed[0], placed[-1] = 1.0, -1.0
     conditions = [(weight, e, 0.0) for weight in (closing, placed) for e in (E1, E2, E3)]
-    supports = supports(rod, clamped=(0, n), held=tuple(conditions), reach={n + 1: sense})
+    supports = supported(rod, clamped=(0, n), held=tuple(conditions), reach={n + 1: sense})
     supports.free[[0, n], 3:] = True
     supports.free[-1] = [True, True, False, False][: rod.block]  # nor has it a spin, or a strain
     quat = np.vstack([state.quat, state.quat[:1], _with_tangent(axis)])
     stretch = np.concatenate([state.stretch, [state.stretch[0], 0.0]])
     start = State(quat, stretch, np.zeros(6), 0.0)
-    return Tool(
+    return Actuator(
         "force",
         points,
         direction,
         sense * axis,
-        _piece(rod, supports, start),
+        RodSystem(rod, supports, parameter_name="push"),
+        start,
         first,
         sense,
         load_max,
-        alone.rod,
+        free.rod,
     )
 
 
@@ -197,18 +193,18 @@ def _with_tangent(axis: Array) -> Array:
     return half / size if size > 1e-8 else np.array([0.0, 1.0, 0.0, 0.0])
 
 
-def _yielding(alone: Alone, points: tuple[int, int]) -> Array:
+def _yielding(free: FreeRing, points: tuple[int, int]) -> Array:
     """Directions (3, 3), the softest first, in which a pair of forces moves its points apart."""
-    rod, state = _renumbered(alone, points[0])
+    rod, state = _renumbered(free, points[0])
     far = (points[1] - points[0]) % rod.n_edges
-    supports = free_ring(rod)
+    supports = free_supports(rod)
     weight = np.tile(_way(rod, far), (3, 1))
     measured = supports._replace(weight=weight, axis=np.eye(3), target=np.zeros(3))
     border = assemble(rod, measured, state.quat, state.stretch, np.zeros(3), 0.0).border
     compliance = np.empty((3, 3))
     for k in range(3):
         loaded = supports._replace(pull=weight[0][:, None] * np.eye(3)[k])
-        t = equilibrium(rod, loaded, state).tangent
+        t = split(loaded, RodSystem(rod, loaded).correct(state).tangent)
         compliance[:, k] = np.einsum("jbi,jb->i", border, t.q) / t.load
     _, axes = np.linalg.eigh(0.5 * (compliance + compliance.T))
     return np.ascontiguousarray(axes.T[::-1])
@@ -217,18 +213,18 @@ def _yielding(alone: Alone, points: tuple[int, int]) -> Array:
 # --- Wrenches --------------------------------------------------------------------------------
 
 
-def wrenches(alone: Alone, points: tuple[int, int]) -> list[Tool]:
+def wrenches(free: FreeRing, points: tuple[int, int]) -> list[Actuator]:
     """Two wrenches at two points of the planar folded ring, that turn about each of three axes.
 
     Along the line between the points, across it in the plane, and normal to it. The mirror image
     in its plane maps a folded ring to itself, so that both senses are alike about the first two.
     """
-    first, second = (rotation(alone.state.quat[j]) for j in points)
-    normal = _normal(alone.state)
-    x = vertices(alone.state.quat, alone.rod.length * (1.0 + alone.state.stretch))
-    place = _places(alone.rod, alone.state, x)
+    first, second = (rotation(free.state.quat[j]) for j in points)
+    normal = _normal(free.state)
+    x = vertices(free.state.quat, free.rod.length * (1.0 + free.state.stretch))
+    place = _places(free.rod, free.state, x)
     line = place[points[1]] - place[points[0]]
-    if float(np.linalg.norm(line)) < _ONE_PLACE * float(alone.rod.length.sum()):
+    if float(np.linalg.norm(line)) < _ONE_PLACE * float(free.rod.length.sum()):
         line = first[:, 2] + second[:, 2]
     line = line - (line @ normal) * normal
     line /= np.linalg.norm(line)
@@ -238,19 +234,19 @@ def wrenches(alone: Alone, points: tuple[int, int]) -> list[Tool]:
         ("about the normal", normal),
     )
     return [
-        _wrenched(alone, points, axis, sense, name)
+        _wrenched(free, points, axis, sense, name)
         for name, axis in axes
         for sense in ((1.0, -1.0) if axis is normal else (1.0,))
     ]
 
 
 def _wrenched(
-    alone: Alone, points: tuple[int, int], axis: Array, sense: float, direction: str
-) -> Tool:
-    rod, state = _renumbered(alone, points[0])
+    free: FreeRing, points: tuple[int, int], axis: Array, sense: float, direction: str
+) -> Actuator:
+    rod, state = _renumbered(free, points[0])
     far = (points[1] - points[0]) % rod.n_edges
     one = np.ones(rod.n_edges)
-    supports = supports(
+    supports = supported(
         rod,
         clamped=(0, far),
         held=tuple((one, e, 0.0) for e in (E1, E2, E3)),
@@ -260,16 +256,17 @@ def _wrenched(
     supports.free[[0, far], 3:] = True
     start = state.but(force=np.zeros(3), load=0.0)
     named = direction if sense > 0.0 else f"{direction}, reversed"
-    return Tool(
+    return Actuator(
         "couple",
         points,
         named,
         sense * axis,
-        _piece(rod, supports, start),
+        RodSystem(rod, supports, parameter_name="push"),
+        start,
         0.0,
         sense,
         _ROUND,
-        alone.rod,
+        free.rod,
     )
 
 

@@ -1,6 +1,6 @@
-"""The barrier of a ring left alone in space: the lowest way found from flat to folded.
+"""The barrier of a ring left free in space: the lowest way found from flat to folded.
 
-It starts from what twisting knows. Rests of the twisted ring are equilibria of the ring left alone
+It starts from what twisting knows. Rests of the twisted ring are equilibria of the ring left free
 (`landscape_alone`), so its saddle is one of the free ring's: where it has one way down, it is the
 pass itself; where it has more, modes that break the symmetry of twisting lead down to lower
 saddles, and eigenvector following (`landscape_saddles`) finds them. So do the softest modes of the
@@ -19,22 +19,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from der.analysis.landscape.landscape import FARTHEST, barriers, numerics, rest_of, scene_sector
+from der.analysis.landscape.landscape import FARTHEST, barriers, numerics, rest_of
 from der.analysis.landscape.rest_states import with_rests
 from der.analysis.landscape.saddle_search import climb, downhill_modes
-from der.continuation.arclength import follow
-from der.continuation.events import Point, Wanted, three_covered, point
+from der.analysis.request import Request, ring_of
 from der.continuation.richardson import limits
-from der.continuation.step import ContinuationFailed, Statistics
+from der.errors import ContinuationFailed
 from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation_vector
+from der.problem import Options, Statistics
 from der.records.landscape import Barriers, Pass, Rest, Saddle
-from der.rod.equilibrium import Direction
-from der.rod.falls import EndState
-from der.rod.free_ring import Alone, left_alone
-from der.rod.gradient_flow import flow
+from der.rod.dynamics import EndState, flow
+from der.rod.free_ring import FreeRing, released
 from der.rod.rod import State
-from der.rod.stability import all_modes, softest_modes
 from der.scene import Scene, meshes
 from der.utils.interrupts import interrupts_between_states
 
@@ -50,12 +47,12 @@ class _Found:
     """A saddle of index 1 and the flows down its two sides."""
 
     saddle: Saddle
-    alone: Alone
+    free: FreeRing
     sides: tuple[EndState, ...]
 
 
 def barrier(scene: Scene) -> Pass:
-    """The lowest way found between the flat and the folded ring, left alone in space.
+    """The lowest way found between the flat and the folded ring, left free in space.
 
     Parameters
     ----------
@@ -80,22 +77,22 @@ def barrier(scene: Scene) -> Pass:
 def _pass(scene: Scene, pressed: list[int]) -> Pass:
     """The lowest way found on one mesh."""
     started = time.perf_counter()
-    rests, alone, twisting, why = twisted_rests(scene)
+    rests, free, twisting, why = twisted_rests(scene)
     found: list[_Found] = []
     if not why:
         end = rests[-1]
         ends = {"flat": rests[0].energy, "folded": end.energy}
         if end.index_free != 0:
-            ways = "unknown" if end.index_free is None else str(end.index_free)
-            why = f"left alone the folded ring is no well; ways down: {ways}"
+            index = "unknown" if end.index_free is None else str(end.index_free)
+            why = f"the free folded ring is no well; its index is {index}"
         else:
-            found = _passes(rests, alone, twisting, ends, pressed)
+            found = _passes(rests, free, twisting, ends, pressed)
     across = [one for one in found if set(one.saddle.ends) == {"flat", "folded"}]
     if pressed and not why:
         why = "stopped by the user before all saddles were looked for"
     if not why and not across:
         why = "no saddle was found between the flat and the folded ring"
-    ring = scene_sector(scene, scene.sector)
+    ring = ring_of(scene)
     best = across[0] if across else None
     way, shapes = _way(best) if best is not None else (np.zeros((0, 2)), np.zeros((0, 0, 3)))
     return Pass(
@@ -116,37 +113,29 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
     )
 
 
-def twisted_rests(scene: Scene) -> tuple[list[Rest], list[Alone], Barriers, str]:
+def twisted_rests(scene: Scene) -> tuple[list[Rest], list[FreeRing], Barriers, str]:
     """Rests on the path of twisting, the same without grips, and why there is no pass."""
-    ring, whole = scene_sector(scene, scene.sector), scene_sector(scene, "full")
-    wanted = Wanted(
-        load_max=FARTHEST,
-        until_folded=True,
-        stability=False,
-        contacts=False,
-        tolerance=scene.tolerance,
-        most_steps=600,
-    )
-    statistics, message = Statistics(), ""
-    points: list[Point] = []
+    ring, full = ring_of(scene), ring_of(scene, "full")
+    options = Options(tolerance=scene.tolerance, max_steps=600)
+    request = Request(FARTHEST, until_folded=True, stability=False, self_crossings=False)
+    request = replace(request, options=options)
+    statistics = Statistics()
     try:
-        points.extend(follow(ring, wanted, statistics))
-        points, at = with_rests(ring, wanted, points, statistics)
-    except ContinuationFailed as stuck:
-        return [], [], barriers((), folded=False, message=str(stuck)), str(stuck)
-    folded = three_covered(ring, points[-1].solution)
-    exact = Wanted(contacts=False, tolerance=scene.tolerance)
-    rests = [rest_of(ring, whole, visit(ring, exact, points[k].solution), k) for k in at]
-    alone = [left_alone(ring, whole, points[k].solution.state) for k in at]
+        points = list(request.follow(ring, statistics))
+        points, at = with_rests(ring, request, points, statistics)
+    except ContinuationFailed as failed:
+        return [], [], barriers((), folded=False, message=str(failed)), str(failed)
+    folded = ring.folded(points[-1].solution.state)
+    exact = replace(request, stability=True)
+    rests = [rest_of(ring, full, exact.point(ring, points[k].solution), k) for k in at]
+    free = [released(ring, full, points[k].solution.state) for k in at]
     twisting = barriers(rests, folded=folded)
-    if not folded:
-        message = twisting.why["fold"]
-    return rests, alone, twisting, message
+    return rests, free, twisting, "" if folded else twisting.why["fold"]
 
 
 def _passes(
     rests: list[Rest],
-    alone: list[Alone],
+    free: list[FreeRing],
     twisting: Barriers,
     ends: dict[str, float],
     pressed: list[int],
@@ -154,7 +143,7 @@ def _passes(
     """Saddles of index 1 from all starts, each once, lowest first."""
     found: list[_Found] = []
     alike = ALIKE * abs(ends["folded"])
-    for candidate, twisted in _candidates(rests, alone, twisting):
+    for candidate, twisted in _candidates(rests, free, twisting):
         if pressed:
             break
         energy = _energy(candidate)
@@ -165,12 +154,12 @@ def _passes(
 
 
 def _candidates(
-    rests: list[Rest], alone: list[Alone], twisting: Barriers
-) -> Iterator[tuple[Alone, bool]]:
+    rests: list[Rest], free: list[FreeRing], twisting: Barriers
+) -> Iterator[tuple[FreeRing, bool]]:
     """Saddles of index 1, polished, and whether each is that of twisting."""
-    start = alone[-1]
+    start = free[-1]
     if twisting.saddle is not None:
-        start = alone[twisting.saddle]
+        start = free[twisting.saddle]
     if start.index() == 1:
         yield start, True
     else:
@@ -182,37 +171,34 @@ def _candidates(
                 for sign in (1.0, -1.0):
                     reached = climb(start, along, kick=_along(start, sign * down, _KICK))
                     if reached is not None and reached.is_saddle:
-                        yield reached.alone, False
+                        yield reached.free, False
                         break  # of two that mirror each other one is enough
-    end = alone[-1]
-    supports = end.pinned()
-    _, soft = softest_modes(end.rod, supports, all_modes(supports), end.state, _SOFTEST)
+    end = free[-1]
+    _, soft = end.system.softest_modes(end.state, _SOFTEST)
     for mode in soft:
         reached = climb(end, mode, kick=_along(end, mode, _KICK))
         if reached is not None and reached.is_saddle:
-            yield reached.alone, False
+            yield reached.free, False
 
 
-def _along(alone: Alone, mode: Array, size: float) -> Array:
+def _along(free: FreeRing, mode: Array, size: float) -> Array:
     """Displacement by ``size``, root mean square, along a mode of unit norm in the lengths."""
-    return size * math.sqrt(float(alone.rod.length.sum())) * mode
+    return size * math.sqrt(float(free.rod.length.sum())) * mode
 
 
-def _energy(alone: Alone) -> float:
-    return alone.polished().energy
+def _energy(free: FreeRing) -> float:
+    return free.polished().energy
 
 
-def _described(alone: Alone, energy: float, ends: dict[str, float], *, twisted: bool) -> _Found:
+def _described(free: FreeRing, energy: float, ends: dict[str, float], *, twisted: bool) -> _Found:
     """A saddle with what can be said about it, after going down both sides."""
-    supports = alone.pinned()
-    values, modes = softest_modes(alone.rod, supports, all_modes(supports), alone.state, 3)
+    values, modes = free.system.softest_modes(free.state, 3)
     down = int(np.argmin(values))
     sides = tuple(
         flow(
-            alone.rod,
-            alone.supports,
-            alone.state,
-            kick=Direction(_along(alone, sign * modes[down], _NUDGE), np.zeros(3), 0.0),
+            free.unpinned,
+            free.state,
+            kick=free.unpinned.increment(_along(free, sign * modes[down], _NUDGE)),
             tolerance=1e-7,
             every=1,
         )
@@ -221,14 +207,14 @@ def _described(alone: Alone, energy: float, ends: dict[str, float], *, twisted: 
     names = tuple(name_of_rest(side, ends) for side in sides)
     saddle = Saddle(
         energy,
-        alone.index(),
-        alone.residual,
-        alone.zero_modes,
+        free.index(),
+        free.residual,
+        free.zero_modes,
         twisted,
         names,
         float(values[down]),
     )
-    return _Found(saddle, alone, sides)
+    return _Found(saddle, free, sides)
 
 
 def name_of_rest(side: EndState, ends: Mapping[str, float]) -> str:
@@ -245,15 +231,15 @@ def name_of_rest(side: EndState, ends: Mapping[str, float]) -> str:
 def _way(best: _Found) -> tuple[Array, Array]:
     """Progress and energy from flat over the saddle to folded, and shapes on the way."""
     flat, folded = best.sides if best.saddle.ends[0] == "flat" else best.sides[::-1]
-    states: list[State] = [*flat.history[::-1], best.alone.state, *folded.history]
+    states: list[State] = [*flat.history[::-1], best.free.state, *folded.history]
     energies = np.concatenate([flat.energies[::-1], [best.saddle.energy], folded.energies])
-    mass = best.alone.rod.mass
+    mass = best.free.rod.mass
     steps = [
         float(np.sqrt(np.sum(mass * rotation_vector(a.quat, b.quat) ** 2)))
         for a, b in pairwise(states)
     ]
     progress = np.append(0.0, np.cumsum(steps))
     chosen = np.unique(np.searchsorted(progress, np.linspace(0.0, progress[-1], _SHAPES)))
-    length = best.alone.rod.length
+    length = best.free.rod.length
     x = [vertices(states[k].quat, length * (1.0 + states[k].stretch)) for k in chosen]
     return np.column_stack([progress, energies]), np.array(x)

@@ -16,17 +16,18 @@ from itertools import product
 import numpy as np
 
 from der.kernels.quaternions import Array, rotation_vector
-from der.rod.equilibrium import ADVICE, Direction, Equilibrium, equilibrium, moved
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import relax
 from der.rod.rod import State, edges
-from der.rod.stability import all_modes, softest_modes
 from der.rod.supports import Supports
+from der.rod.system import RodSystem
+from der.utils.run import Run
 
 MOST_MINIMA = 6  # in one cell
 _SAME = 1e-6  # rad, root mean square: two minima that are one
 _NEAR = 0.5  # rad, likewise: a neighbour on the same sheet
-_PIECES = (1, 4)  # of the way to a neighbour, before the state is let fall
+_PARTS = (1, 4)  # of the way to a neighbour, before the state is relaxed
 _RELAXED = 1e-6  # GJ/a, residual at which Newton's method takes over
 _MOST_GRADIENTS = 3000
 _SHAKE = 1.0  # rad, root mean square
@@ -39,7 +40,7 @@ Cell = tuple[int, int]
 class Minimum:
     """A minimum in a cell."""
 
-    at: Equilibrium
+    solution: Equilibrium
     energy: float  # of the full ring
 
 
@@ -57,25 +58,25 @@ class Flood:
     minima: dict[Cell, list[Minimum]] = field(default_factory=dict)
     reasons: dict[Cell, str] = field(default_factory=dict)
 
-    def supports(self, distance: float) -> Supports:
-        """The supports with the grips at a distance."""
+    def system(self, distance: float) -> RodSystem:
+        """The rod with the grips at a distance."""
         target = self.supports.target.copy()
         target[-1] = self.share * distance
-        return self.supports._replace(target=target)
+        return RodSystem(self.ring.rod, self.supports._replace(target=target))
 
     def solve(self, cell: Cell, start: State) -> Equilibrium | None:
         """A minimum in ``cell`` from a state nearby; None, and the reason kept, without one."""
         i, j = cell
-        supports, rod = self.supports(self.distance[j]), self.ring.rod
-        for rings in _PIECES:
-            at = self._walked(cell, start, rings)
-            if _is_minimum(supports, at) and _apart(self.ring, start, at.state) < _NEAR:
+        system = self.system(self.distance[j])
+        for parts in _PARTS:
+            at = self._walked(cell, start, parts)
+            if _is_minimum(at) and _apart(self.ring, start, at.state) < _NEAR:
                 return at
-        begin = self._turned(start, self.gamma[i])
-        fall = relax(rod, supports, begin, tolerance=_RELAXED, most=_MOST_GRADIENTS)
-        if fall.rests:
-            at = equilibrium(rod, supports, fall.state, tolerance=self.tolerance)
-            if _is_minimum(supports, at):
+        begin = _turned(system, start, self.gamma[i])
+        end = relax(system, begin, tolerance=_RELAXED, most=_MOST_GRADIENTS)
+        if end.rests:
+            at = system.correct(end.state, tolerance=self.tolerance)
+            if _is_minimum(at):
                 return at
         if at.converged:
             self.reasons[cell] = "only saddles were found here"
@@ -83,28 +84,22 @@ class Flood:
             self.reasons[cell] = f"no minimum was found from any neighbour: {at.advice}"
         return None
 
-    def _walked(self, cell: Cell, start: State, rings: int) -> Equilibrium:
-        """The equilibrium in ``cell`` by Newton's method, in rings of the way from a state."""
+    def _walked(self, cell: Cell, start: State, parts: int) -> Equilibrium:
+        """The equilibrium in ``cell`` by Newton's method, the way from a state in parts."""
         span = float(edges(self.ring.rod, start)[:, 2].sum()) / self.share
         goal = (self.gamma[cell[0]], self.distance[cell[1]])
         state = start
-        for k in range(1, rings + 1):
+        for k in range(1, parts + 1):
             gamma, distance = (
-                a + (b - a) * k / rings for a, b in zip((start.load, span), goal, strict=True)
+                a + (b - a) * k / parts for a, b in zip((start.load, span), goal, strict=True)
             )
-            begin = self._turned(state, goal[0] if k == rings else gamma)
-            supports = self.supports(goal[1] if k == rings else distance)
-            at = equilibrium(self.ring.rod, supports, begin, tolerance=self.tolerance)
+            system = self.system(goal[1] if k == parts else distance)
+            begin = _turned(system, state, goal[0] if k == parts else gamma)
+            at = system.correct(begin, tolerance=self.tolerance)
             if not at.converged:
                 break
             state = at.state
         return at
-
-    def _turned(self, start: State, gamma: float) -> State:
-        """``start`` with the grips turned to ``gamma``, nothing else moved."""
-        nothing = np.zeros(len(self.supports.target))
-        turn = Direction(np.zeros(self.supports.free.shape), nothing, float(gamma) - start.load)
-        return moved(self.supports, start, turn).but(load=float(gamma))
 
     def add(self, cell: Cell, at: Equilibrium) -> bool:
         """Whether a minimum is new to its cell, which then has it."""
@@ -134,16 +129,16 @@ class Flood:
 def spread(
     flood: Flood,
     seeds: Iterable[tuple[Cell, State]],
-    pressed: list[int],
+    run: Run,
     progress: Callable[[float], object] | None,
 ) -> None:
     """Fill the grid from states near some of its cells on, until no neighbour is new or Ctrl-C."""
     waiting: deque[tuple[Cell, Equilibrium]] = deque()
     for cell, state in seeds:
-        if not pressed:
+        if not run.pressed:
             _try(flood, cell, state, waiting)
     cells = len(flood.gamma) * len(flood.distance)
-    while waiting and not pressed:
+    while waiting and not run.pressed:
         cell, at = waiting.popleft()
         for neighbour in flood.neighbours(cell):
             _try(flood, neighbour, at.state, waiting)
@@ -154,16 +149,14 @@ def spread(
 def shaken(flood: Flood, across: int) -> Iterator[tuple[Cell, State]]:
     """Minima of some cells, about ``across`` in each direction, kicked far along soft modes."""
     n, m = len(flood.gamma), len(flood.distance)
-    rod = flood.ring.rod
-    root = float(np.sqrt(rod.length.sum()))
-    nothing = np.zeros(len(flood.supports.target))
+    root = float(np.sqrt(flood.ring.rod.length.sum()))
     for i, j in product(range(0, n, max(n // across, 1)), range(0, m, max(m // across, 1))):
         for one in flood.among((i, j))[:1]:
-            supports, state = flood.supports(flood.distance[j]), one.solution.state
-            _, modes = softest_modes(rod, supports, all_modes(supports), state, _SHAKEN)
+            system, state = flood.system(flood.distance[j]), one.solution.state
+            _, modes = system.softest_modes(state, _SHAKEN)
             for mode, sign in product(modes, (1.0, -1.0)):
-                kick = Direction(sign * _SHAKE * root * mode, nothing, 0.0)
-                yield (i, j), moved(supports, state, kick)
+                kick = system.increment(sign * _SHAKE * root * mode)
+                yield (i, j), system.retract(state, kick)
 
 
 def _try(flood: Flood, cell: Cell, start: State, waiting: deque[tuple[Cell, Equilibrium]]) -> None:
@@ -172,8 +165,14 @@ def _try(flood: Flood, cell: Cell, start: State, waiting: deque[tuple[Cell, Equi
         waiting.append((cell, at))
 
 
-def _is_minimum(supports: Supports, at: Equilibrium) -> bool:
-    return at.converged and at.negative == len(supports.target)
+def _turned(system: RodSystem, start: State, gamma: float) -> State:
+    """``start`` with the grips turned to ``gamma``, nothing else moved."""
+    turn = system.increment(load=float(gamma) - start.load)
+    return system.retract(start, turn).but(load=float(gamma))
+
+
+def _is_minimum(at: Equilibrium) -> bool:
+    return at.converged and at.index == 0
 
 
 def _apart(ring: GrippedRing, a: State, b: State) -> float:

@@ -8,34 +8,25 @@ and folded above the flat ring; what it costs to open it, the same above the fol
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 
-import numpy as np
-
-from der.analysis.full_ring import shapes
 from der.analysis.landscape.rest_states import with_rests
-from der.continuation.arclength import follow
-from der.continuation.events import Point, Wanted, full_index, three_covered, point
+from der.analysis.path_record import full_shapes, path_record
+from der.analysis.request import Request, ring_of
 from der.continuation.richardson import Extrapolated, limits
-from der.continuation.step import ContinuationFailed, Statistics
-from der.errors import STOPPED
-from der.geometry.mesh import sites
-from der.records.configurations import Shapes
+from der.problem import Options, Point, Statistics, total_index
 from der.records.landscape import Barriers, Landscape, Rest
-from der.records.path import Path, Point, Timing, counts
 from der.rod.equilibrium import Equilibrium
-from der.rod.free_ring import left_alone
-from der.rod.gripped_ring import GrippedRing, sector
+from der.rod.free_ring import released
+from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import edges
 from der.scene import Scene, meshes
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 FARTHEST = 2.0 * math.pi  # rad; a path that gets there unfolded, or to its negative, does not fold
 _MOST_STEPS = 600  # rings that fold do so in less than 150
 _NO_WELL = "the folded ring is no well: it opens by itself when its grips turn freely"
-_KINDS = ("fold", "limit", "branch")
 
 
 def landscape(
@@ -56,46 +47,69 @@ def landscape(
     goes: see ``path.status`` and ``path.message``. With the scene's ``error_bars`` the barriers
     are extrapolated, too.
     """
-    ring = scene_sector(scene, scene.sector)
-    wanted = Wanted(
-        load_max=FARTHEST,
+    ring = ring_of(scene)
+    request = Request(
+        gamma_max=FARTHEST,
         until_folded=True,
         targets=None if scene.save_at is None else tuple(scene.save_at),
         stability=scene.stability,
-        contacts=False,
-        tolerance=scene.tolerance,
-        most_steps=_MOST_STEPS,
+        self_crossings=False,
+        options=Options(tolerance=scene.tolerance, max_steps=_MOST_STEPS),
     )
-    statistics, started = Statistics(), time.perf_counter()
-    points, status, message = _followed(ring, wanted, statistics, progress)
-    with interrupts_between_states() as pressed:
-        exact = replace(wanted, stability=True)  # rests are few: their index is always wanted
-        try:
-            points, at = with_rests(ring, exact, points, statistics)
-        except ContinuationFailed as stuck:
-            at, status, message = [], "not converged", str(stuck)
-        whole = scene_sector(scene, "full") if index_free else None
-        for k in at:
-            if points[k].index is None:
-                points[k] = visit(ring, exact, points[k].solution, kind=points[k].kind)
-        rests = tuple(rest_of(ring, whole, points[k], k) for k in at)
-        folded = bool(points) and status == "done" and three_covered(ring, points[-1].solution)
-        timing = Timing(
-            time.perf_counter() - started, statistics.newton_iterations, statistics.steps
-        )
-        path = _path(scene, ring, points, timing, status, message)
-        found = Landscape(path, rests, folded, barriers(rests, folded=folded, message=message))
-        bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
-        extrapolates = scene.error_bars and folded
+    statistics = Statistics()
+
+    def tell(one: Point[Equilibrium]) -> None:
+        if progress is not None:
+            progress(one.solution.parameter)
+
+    with Run() as run:
+        points = run.collect(request.follow(ring, statistics), tell)
+        found = _found(scene, ring, request, points, run, statistics, index_free=index_free)
+        extrapolates = scene.error_bars and found.folded
         coarser = meshes(scene.n_edges, ring.name)[1:] if extrapolates else ()
+        bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
         coarse = [
-            landscape(replace(bare, n_edges=n), index_free=False) for n in coarser if not pressed
+            landscape(replace(bare, n_edges=n), index_free=False)
+            for n in coarser
+            if not run.pressed
         ]
-    if pressed:
-        return replace(found, path=path.interrupted())
+    if run.status == "interrupted":
+        return replace(found, path=run.marked(found.path))
     if not extrapolates:
         return found
     return _without_mesh(found, limits([_heights(one) for one in (found, *coarse)]))
+
+
+def _found(
+    scene: Scene,
+    ring: GrippedRing,
+    request: Request,
+    points: list[Point[Equilibrium]],
+    run: Run,
+    statistics: Statistics,
+    *,
+    index_free: bool,
+) -> Landscape:
+    """The landscape on the scene's own mesh."""
+    exact = replace(request, stability=True)  # these states are few: their index is always wanted
+    points, at = run.attempt(lambda: with_rests(ring, exact, points, statistics)) or (points, [])
+    full = ring_of(scene, "full") if index_free else None
+    for k in at:
+        if points[k].index is None:
+            points[k] = exact.point(ring, points[k].solution, kind=points[k].kind)
+    rests = tuple(rest_of(ring, full, points[k], k) for k in at)
+    done = bool(points) and run.status == "done"
+    folded = done and ring.folded(points[-1].solution.state)
+    path = path_record(
+        scene,
+        ring,
+        points,
+        run,
+        statistics,
+        numerics=numerics(scene, ring),
+        shapes=full_shapes(scene, ring, points, modes=scene.modes) if scene.shapes else None,
+    )
+    return Landscape(path, rests, folded, barriers(rests, folded=folded, message=run.message))
 
 
 def _heights(one: Landscape) -> dict[str, float | None]:
@@ -126,18 +140,6 @@ def _without_mesh(one: Landscape, sure: Extrapolated) -> Landscape:
     return replace(one, extrapolated=values)
 
 
-def scene_sector(scene: Scene, name: str) -> GrippedRing:
-    """The sector ``name`` of the scene's ring, on the scene's mesh."""
-    return gripped_ring(
-        scene.ring,
-        scene.section,
-        scene.n_edges,
-        name=name,
-        measure=scene.curvature,
-        stretching=scene.stretching,
-    )
-
-
 def barriers(rests: Sequence[Rest], *, folded: bool, message: str = "") -> Barriers:
     """Barriers between the first of the rests, flat, and the last, where that is ``folded``."""
     if not folded:
@@ -153,8 +155,8 @@ def barriers(rests: Sequence[Rest], *, folded: bool, message: str = "") -> Barri
             why["fold"] = "the saddle is the folded ring itself"
     elif (saddle.index_moment or 0) > 1:
         why["fold"] = why["open"] = (
-            f"the saddle has {saddle.index_moment} ways down, one of which at least breaks the "
-            f"symmetry: there is a lower one beside it"
+            f"the saddle has {saddle.index_moment} unstable modes, and at least one of them breaks the"
+            " symmetry: there is a lower saddle beside it"
         )
     opening = saddle.energy - end.energy if end.kind == "well" else None
     return Barriers(saddle.energy - flat.energy, opening, highest, why)
@@ -170,93 +172,21 @@ def distance(ring: GrippedRing, at: Equilibrium) -> float:
     return span * (2.0 if ring.name == "quarter" else 1.0)
 
 
-def _followed(
-    ring: GrippedRing,
-    wanted: Wanted,
-    statistics: Statistics,
-    progress: Callable[[float], object] | None,
-) -> tuple[list[Point], str, str]:
-    """The path as far as it goes, its status and a sentence about it."""
-    points: list[Point] = []
-    try:
-        with interrupts_between_states() as pressed:
-            for one in follow(ring, wanted, statistics):
-                points.append(one)
-                if progress is not None:
-                    progress(one.solution.parameter)
-                if pressed:
-                    return points, "interrupted", STOPPED
-    except ContinuationFailed as stuck:
-        return points, "not converged", str(stuck)
-    return points, "done", ""
-
-
-def rest_of(ring: GrippedRing, whole: GrippedRing | None, one: Point, position: int) -> Rest:
-    """What is known of a rest."""
-    supports = total_index(ring, one.index)
-    slope = ring.moment(one.solution.slope)
+def rest_of(
+    ring: GrippedRing, full: GrippedRing | None, one: Point[Equilibrium], position: int
+) -> Rest:
+    """Return what is known of an equilibrium without load; ``full``: the full ring."""
+    at, index = one.solution, total_index(ring, one.index)
+    slope = ring.arm_moment(at.slope)
     return Rest(
-        gamma=one.solution.parameter,
-        energy=ring.copies * one.solution.energy,
-        index_moment=None if held is None else held + (slope < 0.0),
-        index_free=None if whole is None else left_alone(ring, whole, one.solution.state).index(),
+        gamma=at.parameter,
+        energy=ring.copies * at.energy,
+        index_moment=None if index is None else index + (slope < 0.0),
+        index_free=None if full is None else released(ring, full, at.state).index(),
         slope=slope,
-        distance=distance(ring, one.solution),
+        distance=distance(ring, at),
         position=position,
     )
-
-
-def _path(
-    scene: Scene,
-    ring: GrippedRing,
-    points: Sequence[Point],
-    timing: Timing,
-    status: str,
-    message: str,
-) -> Path:
-    """The record of what was visited."""
-    supports = [total_index(ring, one.index) for one in points]
-    under_moment = [
-        None if i is None or one.kind == "limit" else i + (one.solution.slope < 0.0)
-        for one, i in zip(points, supports, strict=True)
-    ]
-    points = []
-    for k, one in enumerate(points):
-        if one.kind in _KINDS:
-            before, after = (
-                total_index(ring, index) for index in one.sides or (one.index, one.index)
-            )
-            numbers = (
-                one.solution.parameter,
-                ring.moment(one.solution.moment),
-                ring.copies * one.solution.energy,
-            )
-            points.append(Point(one.kind, *numbers, before, after, k, one.details))
-    return Path(
-        solver="der",
-        ring=scene.ring.to_json(),
-        section=asdict(scene.section),
-        numerics=numerics(scene, ring),
-        gamma=np.array([one.solution.parameter for one in points]),
-        moment=np.array([ring.moment(one.solution.moment) for one in points]),
-        energy=np.array([ring.copies * one.solution.energy for one in points]),
-        index=counts(supports),
-        index_moment=counts(under_moment),
-        points=tuple(points),
-        at_pi=None,
-        mode=None,
-        error=None,
-        timing=timing,
-        shapes=_shapes(scene, ring, points) if scene.shapes and points else None,
-        status=status,
-        message=message,
-    )
-
-
-def _shapes(scene: Scene, ring: GrippedRing, points: Sequence[Point]) -> Shapes:
-    """The full ring at every state."""
-    arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
-    return shapes(ring, points, arc_length, history=False, modes=scene.modes)
 
 
 def numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:

@@ -3,7 +3,7 @@
 Pairs of points on a grid are tried, each with all its tools (`landscape_tools`); of pairs that a
 symmetry of the folded ring maps onto each other one. Between the points of the grid the search goes
 on around the best of each kind. A slow push of prescribed length or angle cannot take less than
-the barrier of the ring left alone (`landscape_march`): one that takes just that is the best there
+the barrier of the ring left free (`landscape_march`): one that takes just that is the best there
 can be, whatever else was tried.
 """
 
@@ -16,8 +16,9 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from der.analysis.landscape.barrier import barrier, twisted_rests
-from der.analysis.landscape.landscape import numerics, scene_sector
+from der.analysis.landscape.landscape import numerics
 from der.analysis.landscape.opening_search import Search, refine, scan
+from der.analysis.request import ring_of
 from der.continuation.richardson import Extrapolated, limits
 from der.records.landscape import Pass
 from der.records.opening import LeastPush
@@ -61,16 +62,16 @@ def least_push(
     started = time.perf_counter()
     grid = _grid(scene, points)
     with interrupts_between_states() as pressed:
-        alone = barrier(replace(scene, error_bars=False))
-        search, why = _begun(scene, alone)
-        status = alone.status
+        free = barrier(replace(scene, error_bars=False))
+        search, why = _begun(scene, free)
+        status = free.status
         if search is not None and not pressed:
             scan(search, grid, pressed, progress)
             if between:
-                refine(search, scene.n_edges // grid, alone.open, pressed)
+                refine(search, scene.n_edges // grid, free.open, pressed)
         sure: Extrapolated = {}
         if search is not None and scene.error_bars and not pressed:
-            sure = _without_mesh(search, alone)
+            sure = _without_mesh(search, free)
     if search is not None and not why and not any(push.opens for push, _ in search.all):
         why = "no push was found that opens the ring"
     if pressed:
@@ -78,9 +79,9 @@ def least_push(
     return LeastPush(
         scene.ring.to_json(),
         asdict(scene.section),
-        numerics(scene, scene_sector(scene, "full")) | {"points": grid},
-        alone.open,
-        alone.twisting.open,
+        numerics(scene, ring_of(scene, "full")) | {"points": grid},
+        free.open,
+        free.twisting.open,
         tuple(push for push, _ in search.all) if search is not None else (),
         search.least(dead=False) if search is not None else {},
         search.least(dead=True) if search is not None else {},
@@ -101,16 +102,16 @@ def _grid(scene: Scene, points: int | None) -> int:
     return points
 
 
-def _begun(scene: Scene, alone: Pass) -> tuple[Search | None, str]:
+def _begun(scene: Scene, free: Pass) -> tuple[Search | None, str]:
     """The folded ring to be pushed; None and a sentence where it is no well."""
     rests, states, _, why = twisted_rests(scene)
     if why:
         return None, why
     end = rests[-1]
     if end.index_free != 0:
-        ways = "unknown" if end.index_free is None else str(end.index_free)
-        return None, f"left alone the folded ring is no well; ways down: {ways}"
-    heights = zip(_NOT_WORTH, (alone.open, alone.twisting.open), strict=True)
+        index = "unknown" if end.index_free is None else str(end.index_free)
+        return None, f"the free folded ring is no well; its index is {index}"
+    heights = zip(_NOT_WORTH, (free.open, free.twisting.open), strict=True)
     known = [times * height for times, height in heights if height]
     most = max(known, default=np.inf)
     ends = {"flat": rests[0].energy, "folded": end.energy}
@@ -128,15 +129,15 @@ def _shapes(search: Search) -> dict[str, tuple[Array, Array]]:
             _, done = search.all[k]
             moment = done.dead if dead else done.last
             if moment is not None:
-                found[f"{kind} dead" if dead else kind] = done.tool.shape(moment.state)
+                found[f"{kind} dead" if dead else kind] = done.actuator.shape(moment.state)
     return found
 
 
-def _without_mesh(search: Search, alone: Pass) -> Extrapolated:
+def _without_mesh(search: Search, free: Pass) -> Extrapolated:
     """Works and loads of the best pushes, extrapolated from the same ones on coarser meshes."""
     levels = [_works(search, search, 1)]
     for times, n in zip((2, 4), meshes(search.scene.n_edges, "full")[1:], strict=True):
-        coarse, _ = _begun(replace(search.scene, n_edges=n, error_bars=False), alone)
+        coarse, _ = _begun(replace(search.scene, n_edges=n, error_bars=False), free)
         if coarse is None:
             return {}
         coarse.most = np.inf
@@ -157,8 +158,8 @@ def _works(search: Search, level: Search, times: int) -> dict[str, float | None]
                 for one, _ in (level.at(pair) if not any(e % times for e in best.edges) else [])
                 if (one.kind, one.direction) == (best.kind, best.direction)
             ]
-            instant = (same[0].dead if dead else same[0].supports) if same else None
-            wanted = best.dead if dead else best.supports
+            instant = (same[0].dead if dead else same[0].held) if same else None
+            wanted = best.dead if dead else best.held
             alike = instant is not None and wanted is not None and instant.event == wanted.event
             found[name] = instant.work if instant is not None and alike else None
             if dead:

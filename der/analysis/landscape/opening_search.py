@@ -1,4 +1,4 @@
-"""The search for the push of least work: pairs of points, with all tools at each.
+"""The search for the push of least work: pairs of points, with all actuators at each.
 
 On a grid first, and of pairs that a symmetry of the folded ring maps onto each other one; then
 between the points of the grid, around the best of each kind.
@@ -13,11 +13,12 @@ import numpy as np
 
 from der.analysis.landscape.actuators import struts, wrenches
 from der.analysis.landscape.barrier import ALIKE, name_of_rest
-from der.analysis.landscape.landscape import scene_sector
-from der.analysis.landscape.opening_path import March, Moment, march
+from der.analysis.landscape.opening_path import Instant as Reached
+from der.analysis.landscape.opening_path import Opening, opened
+from der.analysis.request import ring_of
 from der.records.opening import ALIKE as TIE
 from der.records.opening import KINDS, Instant, Push, least_of
-from der.rod.free_ring import Alone
+from der.rod.free_ring import FreeRing
 from der.scene import Scene
 
 _UNIFORM = 1e-9  # of cells and natural strains that are alike
@@ -31,19 +32,19 @@ class Search:
     """A folded ring, and what pushing it has come to so far."""
 
     scene: Scene
-    folded: Alone
+    folded: FreeRing
     ends: dict[str, float]  # energies of the rests, by name
     most: float  # work beyond which a push is not followed
-    found: dict[Pair, list[tuple[Push, March]]] = field(default_factory=dict)
+    found: dict[Pair, list[tuple[Push, Opening]]] = field(default_factory=dict)
 
-    def at(self, pair: Pair) -> list[tuple[Push, March]]:
-        """What all tools come to at one pair of points."""
+    def at(self, pair: Pair) -> list[tuple[Push, Opening]]:
+        """What all actuators come to at one pair of points."""
         if pair not in self.found:
             energy = self.ends["folded"]
             self.found[pair] = []
-            for tool in struts(self.folded, pair) + wrenches(self.folded, pair):
-                done = march(
-                    tool,
+            for actuator in struts(self.folded, pair) + wrenches(self.folded, pair):
+                done = opened(
+                    actuator,
                     energy,
                     ALIKE * abs(energy),
                     tolerance=self.scene.tolerance,
@@ -54,7 +55,7 @@ class Search:
         return self.found[pair]
 
     @property
-    def all(self) -> list[tuple[Push, March]]:
+    def all(self) -> list[tuple[Push, Opening]]:
         """Everything found so far."""
         return [one for several in self.found.values() for one in several]
 
@@ -68,7 +69,7 @@ class Search:
 def scan(
     search: Search, grid: int, pressed: list[int], progress: Callable[[float], object] | None
 ) -> None:
-    """Try all tools at the pairs of a grid; ``progress`` is called with the share that is done."""
+    """Try all actuators at the pairs of a grid; ``progress`` is called with the share that is done."""
     pairs = list(_pairs(search, grid))
     for k, pair in enumerate(pairs):
         if pressed:
@@ -131,7 +132,7 @@ def _descend(
         if best is None or best == before:
             return
         push, _ = search.all[best]
-        if not dead and barrier is not None and push.supports.work < (1.0 + TIE) * barrier:
+        if not dead and barrier is not None and push.held.work < (1.0 + TIE) * barrier:
             return
         for pair in _around(search, push.edges, stride):
             search.at(pair)
@@ -145,38 +146,38 @@ def _around(search: Search, pair: Pair, stride: int) -> list[Pair]:
     return sorted({same_pair(search, one) for one in near if one[0] != one[1]})
 
 
-def _push(search: Search, done: March) -> Push:
-    tool = done.tool
+def _push(search: Search, done: Opening) -> Push:
+    actuator = done.actuator
     if done.last is None:
-        raise ValueError("march must have come somewhere, got none")
-    s = scene_sector(search.scene, "full").arc_length / search.scene.ring.length
+        raise ValueError("a push must have come somewhere, got none")
+    s = ring_of(search.scene, "full").arc_length / search.scene.ring.length
     energy = search.ends["folded"]
-    first, second, third = tool.axis.tolist()
+    first, second, third = actuator.axis.tolist()
     line = np.array(done.line)
     return Push(
-        tool.kind,
-        (float(s[tool.points[0]]), float(s[tool.points[1]])),
-        tool.points,
-        tool.direction,
+        actuator.kind,
+        (float(s[actuator.points[0]]), float(s[actuator.points[1]])),
+        actuator.points,
+        actuator.direction,
         (first, second, third),
         _instant(search, done.last),
         None if done.dead is None else _instant(search, done.dead),
         done.opens(done.last),
         done.opens(done.dead),
         done.peak,
-        done.falls,
+        done.snaps,
         np.column_stack([line[:, :2], line[:, 2] - energy]),
         done.why,
     )
 
 
-def _instant(search: Search, moment: Moment) -> Instant:
+def _instant(search: Search, reached: Reached) -> Instant:
     return Instant(
-        moment.kind,
-        moment.push,
-        moment.force,
-        moment.work,
-        moment.energy - search.ends["folded"],
-        *moment.index,
-        "" if moment.lands is None else name_of_rest(moment.lands, search.ends),
+        reached.kind,
+        reached.push,
+        reached.force,
+        reached.work,
+        reached.energy - search.ends["folded"],
+        *reached.index,
+        "" if reached.lands is None else name_of_rest(reached.lands, search.ends),
     )

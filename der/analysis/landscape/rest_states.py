@@ -1,6 +1,6 @@
-"""States of rest on a path, M = 0, each solved for as an equilibrium: none is interpolated.
+"""Equilibria without load on a path, M = 0, each solved for: none is interpolated.
 
-Limits of the moment are states of the path, so that M is monotonic between neighbours and one that
+Limits of the moment are points of the path, so that M is monotonic between neighbours and one that
 changes its sign there has one root.
 """
 
@@ -8,21 +8,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
-from der.continuation.events import Point, Wanted, point
+from der.analysis.request import Request
 from der.continuation.roots import find_root
-from der.continuation.step import Step, Statistics
-from der.rod.equilibrium import Equilibrium, dot
+from der.continuation.step import between
+from der.problem import Point, Statistics
+from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
+from der.rod.system import RodSystem
 
 _NO_MOMENT = 1e-8  # of the largest |M|: rounding, at the flat and the folded ring
 
 
 def with_rests(
-    ring: GrippedRing, wanted: Wanted, points: Sequence[Point], statistics: Statistics
-) -> tuple[list[Point], list[int]]:
-    """The states of a path with those of rest put in, and the positions of these.
+    ring: GrippedRing,
+    request: Request,
+    points: Sequence[Point[Equilibrium]],
+    statistics: Statistics,
+) -> tuple[list[Point[Equilibrium]], list[int]]:
+    """Return the points of a path with those at M = 0 put in, and the positions of these.
 
     Raises
     ------
@@ -30,40 +34,40 @@ def with_rests(
         Where an equilibrium cannot be solved for within a step of the path.
     """
     rounding = _NO_MOMENT * max((abs(one.solution.moment) for one in points), default=0.0)
-    line: list[Point] = []
+    line: list[Point[Equilibrium]] = []
     rests: list[int] = []
     for one in points:
-        here = _is_at_rest(one, rounding)
+        here = _without_load(one, rounding)
         if line and not here and (not rests or rests[-1] != len(line) - 1):
             before = line[-1].solution
             if before.moment * one.solution.moment < 0.0:
                 rests.append(len(line))
-                line.append(
-                    visit(
-                        ring, wanted, without_moment(ring, wanted, statistics, before, one.solution)
-                    )
-                )
+                at = without_moment(ring, before, one.solution, request.tolerance, statistics)
+                line.append(request.point(ring, at))
         if here:
             rests.append(len(line))
         line.append(one)
     return line, rests
 
 
-def _is_at_rest(one: Point, rounding: float) -> bool:
-    """Whether a state is the flat or the folded ring, where no moment is left but rounding."""
+def _without_load(one: Point[Equilibrium], rounding: float) -> bool:
+    """Whether a point is the flat or the folded ring, where no moment is left but rounding."""
     return one.solution.parameter in (0.0, math.pi) and abs(one.solution.moment) <= rounding
 
 
 def without_moment(
-    ring: GrippedRing, wanted: Wanted, statistics: Statistics, a: Equilibrium, b: Equilibrium
+    system: RodSystem, a: Equilibrium, b: Equilibrium, tolerance: float, statistics: Statistics
 ) -> Equilibrium:
-    """The equilibrium with M = 0 between two neighbouring states of a path.
+    """Return the equilibrium with M = 0 between two neighbouring states of a path.
 
     Raises
     ------
     ContinuationFailed
         Where it cannot be solved for.
     """
-    step = Step(ring, a, b, 1.0, wanted.tolerance, statistics)
-    step = replace(step, length=ring.inner(a.tangent, step.jump))
-    return step.at(find_root(lambda s: step.at(s).moment, 0.0, step.length))
+    step = between(system, a, b, tolerance=tolerance, statistics=statistics)
+
+    def moment(s: float) -> float:
+        return step.at(s).observables["moment"][0]
+
+    return step.at(find_root(moment, 0.0, step.length))  # type: ignore[return-value]

@@ -1,4 +1,4 @@
-"""Saddles of a ring left alone: uphill along one mode, downhill along all others.
+"""Saddles of the free ring: uphill along one mode, downhill along all others.
 
 Eigenvector following (Cerjan and Miller 1981; Wales 1994). In the eigenbasis of the Hessian on the
 conditions Newton's step is -g/mu, which climbs where mu < 0 and descends where mu > 0. With its
@@ -17,11 +17,9 @@ from numba import njit
 from der.kernels.assembly import assemble, take_out
 from der.kernels.block_ldl import factor, solve_refined
 from der.kernels.quaternions import Array
-from der.rod.equilibrium import Direction, Equilibrium, moved
-from der.rod.free_ring import Alone, balance
-from der.rod.rod import Rod, State
-from der.rod.stability import all_modes, softest_modes
-from der.rod.supports import Supports
+from der.rod.equilibrium import Equilibrium
+from der.rod.free_ring import FreeRing, balance
+from der.rod.system import RodSystem
 
 _LONGEST = 0.05  # rad, root mean square, of a step; thin strips (h/t = 30) do not follow 0.1
 _NEARLY = 1e-5  # GJ/a, largest force: Newton's method takes over
@@ -34,8 +32,8 @@ _MODES = 5  # looked at in each step: more never point down on the way
 class Climb:
     """Where following a mode has led."""
 
-    alone: Alone
-    at: Equilibrium
+    free: FreeRing
+    solution: Equilibrium
     index: int | None
     steps: int
 
@@ -45,7 +43,7 @@ class Climb:
         return self.solution.converged and self.index == 1
 
 
-def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | None:
+def climb(start: FreeRing, along: Array, *, kick: Array | None = None) -> Climb | None:
     """The equilibrium that following a mode uphill leads to; None where it leads nowhere.
 
     Parameters
@@ -57,15 +55,14 @@ def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | N
     if kick is not None:
         here = displaced(here, kick)
     for step in range(_STEPS):
-        supports = here.pinned()
-        state = here.state
-        found = newton_step(here.rod, supports, state)
+        system = here.system
+        found = newton_step(system, here)
         if found is None:
             return None
         newton, grad = found
         if float(np.abs(grad).max()) < _NEARLY:
             return _polished(here, step)
-        values, modes = softest_modes(here.rod, supports, all_modes(supports), state, _MODES)
+        values, modes = system.softest_modes(here.state, _MODES)
         # far from the saddle the followed mode is known by its shape, near to it as the only one
         overlap = [abs(float(np.sum(here.rod.length[:, None] * mode * m))) for m in modes]
         chosen = int(np.argmax(overlap))
@@ -78,16 +75,15 @@ def climb(start: Alone, along: Array, *, kick: Array | None = None) -> Climb | N
     return None
 
 
-def downhill_modes(alone: Alone, count: int = 4) -> list[Array]:
+def downhill_modes(free: FreeRing, count: int = 4) -> list[Array]:
     """Modes (n, b) of negative stiffness among the ``count`` softest, the softest first."""
-    supports = alone.pinned()
-    values, modes = softest_modes(alone.rod, supports, all_modes(supports), alone.state, count)
+    values, modes = free.system.softest_modes(free.state, count)
     order = np.argsort(values)
     return [modes[k] for k in order if values[k] < 0.0]
 
 
 def _turned(
-    here: Alone, newton: Array, grad: Array, values: Array, modes: Array, chosen: int
+    here: FreeRing, newton: Array, grad: Array, values: Array, modes: Array, chosen: int
 ) -> Array:
     """Newton's step (n, b) turned in the softest modes: uphill along the chosen one, else down."""
     length = float(here.rod.length.sum())
@@ -121,31 +117,34 @@ def _system(rod, supports, quat, stretch, force):
     return x, system.grad, solved
 
 
-def newton_step(rod: Rod, supports: Supports, state: State) -> tuple[Array, Array] | None:
+def newton_step(system: RodSystem, here: FreeRing) -> tuple[Array, Array] | None:
     """Newton's step and the gradient (n, b); None where the matrix is singular."""
-    step, grad, solved = _system(rod, supports, state.quat, state.stretch, state.force)
+    state = here.state
+    step, grad, solved = _system(
+        system.rod, system.supports, state.quat, state.stretch, state.force
+    )
     return (step[:, :, 0], grad) if solved else None
 
 
-def displaced(here: Alone, w: Array) -> Alone:
+def displaced(here: FreeRing, w: Array) -> FreeRing:
     """A ring displaced by ``w`` (n, b), on its conditions again, with the best forces."""
-    supports, load = here.supports, here.state.load
+    system, supports, load = here.unpinned, here.supports, here.state.load
     nothing = np.zeros(len(supports.target))
-    state = moved(supports, here.state, Direction(w, nothing, 0.0))
+    state = system.retract(here.state, system.increment(w))
     free = supports.free.ravel()
     for _ in range(8):
-        system = assemble(here.rod, supports, state.quat, state.stretch, nothing, load)
-        if float(np.abs(system.gap).max()) < 1e-12:
+        found = assemble(here.rod, supports, state.quat, state.stretch, nothing, load)
+        if float(np.abs(found.gap).max()) < 1e-12:
             break
-        border = system.border.reshape(len(free), -1)[free]
+        border = found.border.reshape(len(free), -1)[free]
         back = np.zeros(supports.free.shape)
-        back[supports.free] = np.linalg.lstsq(border.T, -system.gap, rcond=None)[0]
-        state = moved(supports, state, Direction(back, nothing, 0.0))
+        back[supports.free] = np.linalg.lstsq(border.T, -found.gap, rcond=None)[0]
+        state = system.retract(state, system.increment(back))
     return balance(here.rod, state.quat, state.stretch, supports, load)
 
 
-def _polished(here: Alone, steps: int) -> Climb:
+def _polished(here: FreeRing, steps: int) -> Climb:
     """The equilibrium next to it, and its index with all that it leaves free."""
     at = here.polished()
-    alone = balance(here.rod, at.state.quat, at.state.stretch, here.supports, here.state.load)
-    return Climb(alone, at, alone.index() if at.converged else None, steps)
+    free = balance(here.rod, at.state.quat, at.state.stretch, here.supports, here.state.load)
+    return Climb(free, at, free.index() if at.converged else None, steps)

@@ -2,31 +2,29 @@
 
 On the path of twisting the grips slide as they like. Here their distance is prescribed, too: one
 more position condition, whose multiplier is the axial force. From the path on, minima spread over
-a grid (`landscape_flood`).
+a grid (`flood`).
 
 Minima are those of the sector: of shapes with the symmetry of a ring in its grips. The index of
-the full ring, distance supports, says where one of them can be left by breaking the symmetry.
+the full ring, distance held, says where one of them can be left by breaking the symmetry.
 """
 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
+from itertools import pairwise
 
 import numpy as np
 
 from der.analysis.landscape.flood import Cell, Flood, shaken, spread
-from der.analysis.landscape.landscape import FARTHEST, distance, numerics, scene_sector
+from der.analysis.landscape.landscape import FARTHEST, distance, numerics
 from der.analysis.landscape.rest_states import with_rests
 from der.analysis.loading import follow_angle
+from der.analysis.request import Request, ring_of
 from der.analysis.snap import Landing
-from der.continuation.arclength import follow
-from der.continuation.events import Point, Wanted
-from der.continuation.step import ContinuationFailed, Statistics
-from der.errors import STOPPED
 from der.kernels.quaternions import Array
+from der.problem import Options, Point, Statistics
 from der.records.energy_surface import Surface
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import E3, GrippedRing
@@ -34,7 +32,7 @@ from der.rod.rod import State
 from der.rod.stability import index
 from der.rod.supports import Supports
 from der.scene import Scene
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 STRETCHED = 0.97  # of half the ring's length: beyond, closing conditions lose their rank
 _CEILING = 1.5  # of the path's largest energy: other minima that lie higher are of no interest
@@ -73,24 +71,23 @@ def energy_surface(
     Ctrl-C keeps what there is; see ``status``. A cell without a minimum has a sentence in
     ``reasons``.
     """
-    started = time.perf_counter()
-    ring = scene_sector(scene, scene.sector)
+    ring = ring_of(scene)
     if ring.name == "full":
         raise ValueError("sector must be auto, half or quarter for a surface, got 'full'")
     angles = np.linspace(0.0, math.pi, shape[0]) if gamma is None else np.array(gamma, dtype=float)
-    statistics = Statistics()
-    wanted = Wanted(
-        load_max=FARTHEST,
+    request = Request(
+        gamma_max=FARTHEST,
         until_folded=True,
         targets=tuple(angles),
         stability=False,
-        contacts=False,
-        tolerance=scene.tolerance,
-        most_steps=600,
+        self_crossings=False,
+        options=Options(tolerance=scene.tolerance, max_steps=600),
     )
-    with interrupts_between_states() as pressed:
-        points, message = _path(ring, wanted, statistics, pressed)
-        points, at_rest = with_rests(ring, wanted, points, statistics)
+    with Run() as run:
+        points = run.collect(request.follow(ring))
+        if run.status == "not converged":  # a surface around as much of the path as there is
+            run.status, run.message = "done", f"the path of twisting: {run.message}"
+        points, without_load = with_rests(ring, request, points, Statistics())
         line = np.array([_place(ring, one.solution) for one in points])
         low, high = _range(scene, line[:, 1]) if distance_range is None else distance_range
         if not low < high <= 0.5 * scene.ring.length:
@@ -107,11 +104,9 @@ def energy_surface(
             scene.tolerance,
             _CEILING * float(line[:, 2].max()),
         )
-        spread(flood, _seeds(flood, points), pressed, progress)
-        spread(flood, shaken(flood, _SHAKES), pressed, progress)
-        fallen = _snaps(ring, wanted, angles, pressed) if snaps else ()
-    status = "interrupted" if pressed else "done"
-    message = STOPPED if pressed else message
+        spread(flood, _seeds(flood, points), run, progress)
+        spread(flood, shaken(flood, _SHAKES), run, progress)
+        snapped = _snaps(ring, request, float(angles[-1])) if snaps and run.done else ()
     folds = line[[k for k, one in enumerate(points) if one.kind == "fold"]]
     return Surface(
         scene.ring.to_json(),
@@ -120,14 +115,14 @@ def energy_surface(
         angles,
         flood.distance,
         *_maps(flood),
-        _reasons(flood, status),
+        _reasons(flood, run.status),
         (line[:, 0], line[:, 1], line[:, 2]),
         folds,
-        line[at_rest],
-        fallen,
-        status,
-        message,
-        time.perf_counter() - started,
+        line[without_load],
+        snapped,
+        run.status,
+        run.message,
+        run.seconds,
     )
 
 
@@ -141,23 +136,8 @@ def _with_distance(ring: GrippedRing) -> Supports:
     )
 
 
-def _path(
-    ring: GrippedRing, wanted: Wanted, statistics: Statistics, pressed: list[int]
-) -> tuple[list[Point], str]:
-    """States of the path, as far as it goes, and a sentence where that is not to its end."""
-    points: list[Point] = []
-    try:
-        for one in follow(ring, wanted, statistics):
-            points.append(one)
-            if pressed:
-                break
-    except ContinuationFailed as stuck:
-        return points, f"the path of twisting: {stuck}"
-    return points, ""
-
-
 def _place(ring: GrippedRing, at: Equilibrium) -> tuple[float, float, float]:
-    return at.state.load, distance(ring, at), ring.copies * at.energy
+    return at.parameter, distance(ring, at), ring.copies * at.energy
 
 
 def _range(scene: Scene, along_path: Array) -> tuple[float, float]:
@@ -167,7 +147,7 @@ def _range(scene: Scene, along_path: Array) -> tuple[float, float]:
     return low - margin, min(high + margin, STRETCHED * 0.5 * scene.ring.length)
 
 
-def _seeds(flood: Flood, points: Sequence[Point]) -> Iterator[tuple[Cell, State]]:
+def _seeds(flood: Flood, points: Sequence[Point[Equilibrium]]) -> Iterator[tuple[Cell, State]]:
     """States of the path at the angles of the grid, each in the cell of the nearest distance."""
     for i, turn in enumerate(flood.gamma):
         for one in points:
@@ -188,10 +168,10 @@ def _maps(
     for i, j in flood.minima:
         best = flood.among((i, j))[0]
         energy[i, j] = best.energy
-        moment[i, j] = ring.moment(best.solution.moment)
+        moment[i, j] = ring.arm_moment(best.solution.moment)
         # L holds + F (span - share d): dU/dd = -F share for each of the copies
         force[i, j] = -flood.share * ring.copies * best.solution.state.force[-1]
-        ways[i, j] = _index(ring, flood.supports(flood.distance[j]), best.solution.state)
+        ways[i, j] = _index(ring, flood.system(flood.distance[j]).supports, best.solution.state)
     levels = tuple(
         tuple(tuple(one.energy for one in flood.among((i, j))) for j in range(m)) for i in range(n)
     )
@@ -204,7 +184,7 @@ def _index(ring: GrippedRing, supports: Supports, state: State) -> int:
     The arms no longer know of each other: modes in phase and out of phase are alike.
     """
     total = 0
-    for label, (multiplicity, modes) in ring.classes.items():
+    for label, (multiplicity, modes) in ring.symmetry.items():
         if label == "in phase":
             continue
         count = index(ring.rod, supports, modes, state)
@@ -227,27 +207,20 @@ def _reasons(flood: Flood, status: str) -> dict[Cell, str]:
     }
 
 
-def _snaps(
-    ring: GrippedRing, wanted: Wanted, angles: Array, pressed: list[int]
-) -> tuple[Array, ...]:
+def _snaps(ring: GrippedRing, request: Request, last: float) -> tuple[Array, ...]:
     """Gamma, distance and energy along every snap on the way to the last angle and back."""
-    asked = replace(wanted, load_max=float(angles[-1]), until_folded=False, targets=())
-    found: list[Array] = []
-    before: Point | None = None
-    try:
-        for one in follow_angle(ring, asked, Statistics(), unload=True, every=_KEPT):
-            if isinstance(one, Landing) and one.history and before is not None:
-                found.append(_fall(ring, before.solution, one))
-            before = one
-            if pressed:
-                break
-    except ContinuationFailed:
-        pass  # what snapped before it is kept
-    return tuple(found)
+    asked = replace(request, gamma_max=last, until_folded=False, targets=())
+    with Run() as run:  # what snapped before it fails or is stopped is kept
+        points = run.collect(follow_angle(ring, asked, Statistics(), unload=True, every=_KEPT))
+    return tuple(
+        _along_snap(ring, before.solution, one)
+        for before, one in pairwise(points)
+        if isinstance(one, Landing) and one.history
+    )
 
 
-def _fall(ring: GrippedRing, before: Equilibrium, landing: Landing) -> Array:
-    """Gamma, distance and energy on the way down."""
+def _along_snap(ring: GrippedRing, before: Equilibrium, landing: Landing) -> Array:
+    """Gamma, distance and energy from the state before a snap to the one after it."""
     at = landing.solution
     rows = [
         (state.load, distance(ring, replace(at, state=state)), energy)

@@ -29,8 +29,8 @@ import numpy as np
 from der.analysis.landscape.saddle_search import displaced, newton_step
 from der.analysis.multistability.symmetry_images import SAME, Images, Signal, curvatures
 from der.kernels.quaternions import Array
-from der.rod.equilibrium import Direction, equilibrium, moved
-from der.rod.free_ring import Alone, balance
+from der.rod.free_ring import FreeRing, balance
+from der.rod.system import RodSystem
 
 LONGEST = 0.25  # rad, root mean square, of a step
 TOLERANCE = 1e-10  # GJ/a, of an equilibrium
@@ -46,7 +46,7 @@ _NO_DISTANCE = 1e-12
 class Known:
     """A state that was found."""
 
-    alone: Alone
+    free: FreeRing
     images: Signal  # (m, h, 3) signatures of all its images, its own first
     energy: float
 
@@ -67,13 +67,13 @@ def factor(distances: Callable[[float], Array], *, power: float = 2.0, shift: fl
     return math.inf if slope == 1.0 else 1.0 / (1.0 - slope)
 
 
-def deflated(start: Alone, known: Sequence[Known], images: Images) -> Known | None:
+def deflated(start: FreeRing, known: Sequence[Known], images: Images) -> Known | None:
     """A state that is not among the known ones, from a configuration; None where none is met."""
     here = start
     for _ in range(_STEPS):
         if not math.isfinite(here.residual):
             return None
-        found = newton_step(here.rod, here.pinned(), here.state)
+        found = newton_step(here.system, here)
         if found is None:
             return None
         step, grad = found
@@ -86,12 +86,12 @@ def deflated(start: Alone, known: Sequence[Known], images: Images) -> Known | No
     return None
 
 
-def _lengthened(here: Alone, step: Array, known: Sequence[Known], images: Images) -> float:
+def _lengthened(here: FreeRing, step: Array, known: Sequence[Known], images: Images) -> float:
     """Factor of the step at a configuration."""
-    nothing = np.zeros(len(here.supports.target))
+    system = here.unpinned
 
     def distances(t: float) -> Array:
-        state = moved(here.supports, here.state, Direction(t * step, nothing, 0.0))
+        state = system.retract(here.state, system.increment(t * step))
         return nearest(images.signature(curvatures(here.rod, state)), known, images)
 
     return factor(distances) if known else 1.0
@@ -104,24 +104,24 @@ def nearest(k: Signal, known: Sequence[Known], images: Images) -> Array:
     return np.minimum.reduceat(apart, np.cumsum([0, *sizes[:-1]]))
 
 
-def settled(here: Alone, known: Sequence[Known], images: Images) -> Known | None:
+def settled(here: FreeRing, known: Sequence[Known], images: Images) -> Known | None:
     """The equilibrium next to a configuration; None where there is none, or it is known."""
     one = solved(here, images)
     return None if one is None or recognised(one, known, images) is not None else one
 
 
-def solved(here: Alone, images: Images) -> Known | None:
+def solved(here: FreeRing, images: Images) -> Known | None:
     """The equilibrium next to a configuration, verified with all that its supports leave free.
 
     Beside a planar circle material shifts at next to no cost, in it that is a rigid rotation and no
     motion of its own: what is held against it then stands in the way, so both are tried.
     """
-    for held in (here.pinned(), here.pinned(_NEARLY_RIGID)):
-        at = equilibrium(here.rod, supports, here.state, tolerance=TOLERANCE)
+    for supports in (here.pinned(), here.pinned(_NEARLY_RIGID)):
+        at = RodSystem(here.rod, supports).correct(here.state, tolerance=TOLERANCE)
         state = at.state
-        alone = balance(here.rod, state.quat, state.stretch, here.supports, state.load)
-        if at.converged and alone.balanced:
-            return Known(alone, images.all_of(curvatures(here.rod, state)), at.energy)
+        free = balance(here.rod, state.quat, state.stretch, here.supports, state.load)
+        if at.converged and free.balanced:
+            return Known(free, images.all_of(curvatures(here.rod, state)), at.energy)
     return None
 
 

@@ -21,25 +21,25 @@ _FLAT = 1e-6  # a, out of the plane; rad, of strains that are zero
 _TILT = 1e-3  # rad, of the bar in a circle
 
 
-def described(whole: GrippedRing, one: Known, name: str, index: int | None) -> RingState:
+def described(full: GrippedRing, one: Known, name: str, index: int | None) -> RingState:
     """The record of a state."""
-    alone = one.alone
-    rod, state = alone.rod, alone.state
-    gripped = bool(np.any(alone.supports.turn))
+    free = one.free
+    rod, state = free.rod, free.state
+    gripped = bool(np.any(free.supports.turn))
     k = curvatures(rod, state)
-    covering = turning(whole, state)
+    covering = turning(full, state)
     simple = covering is None or abs(covering) == 1
     linked, writhe = None, None
     turns = float(twist(state.quat))
     if simple and rod.n_edges <= CROSSINGS_UP_TO:
-        linked = link(state.quat, whole.lengths(state))[0]
+        linked = link(state.quat, full.lengths(state))[0]
         writhe = linked - turns
-    slides = images(rod, alone.supports, state.load).slides
+    slides = images(rod, free.supports, state.load).slides
     return RingState(
         name,
         one.energy,
         index,
-        alone.residual,
+        free.residual,
         covering is not None,
         covering,
         linked,
@@ -48,23 +48,23 @@ def described(whole: GrippedRing, one: Known, name: str, index: int | None) -> R
         needs_cut(state.quat),
         len(one.images),
         repeats(k) if slides else None,
-        alone.zero_modes,
-        whole.moment(alone.polished().moment) if gripped else None,
-        grip_distance(whole, state) if gripped else None,
+        free.zero_modes,
+        full.arm_moment(free.polished().moment) if gripped else None,
+        grip_distance(full, state) if gripped else None,
     )
 
 
-def turning(whole: GrippedRing, state: State) -> int | None:
+def turning(full: GrippedRing, state: State) -> int | None:
     """Turns of the tangent of a planar centreline, about d1 where it is normal to the plane.
 
     Where the bar lies on its side, the sense is that of the greater turning. None in space.
     """
-    x = vertices(state.quat, whole.lengths(state))
+    x = vertices(state.quat, full.lengths(state))
     x = x - x.mean(axis=0)
     normal = np.linalg.svd(x, full_matrices=False)[2][2]
     if float(np.abs(x @ normal).max()) > _FLAT:
         return None
-    tangents = edges(whole.rod, state)
+    tangents = edges(full.rod, state)
     after = np.roll(tangents, -1, axis=0)
     angle = np.arctan2(np.cross(tangents, after) @ normal, np.sum(tangents * after, axis=1))
     across = float(np.mean(rotation(state.quat)[:, :, 0] @ normal))
@@ -84,39 +84,37 @@ def needs_cut(quat: Array) -> bool:
     return int(np.sum(products < 0.0)) % 2 == 0
 
 
-def grip_distance(whole: GrippedRing, state: State) -> float:
+def grip_distance(full: GrippedRing, state: State) -> float:
     """Distance between the two grips, a."""
-    steps = edges(whole.rod, state)
+    steps = edges(full.rod, state)
     half = len(steps) // 2
     span = 0.5 * (steps[0] + steps[half]) + steps[1:half].sum(axis=0)
     return float(np.linalg.norm(span))
 
 
-def names(whole: GrippedRing, known: Sequence[Known], indices: Sequence[int | None]) -> list[str]:
+def names(full: GrippedRing, known: Sequence[Known], indices: Sequence[int | None]) -> list[str]:
     """A name for each state, in their order: what planar shapes are, kind and number in space."""
-    plain = [
-        _name(whole, one.alone.state, index) for one, index in zip(known, indices, strict=True)
-    ]
+    plain = [_name(full, one.free.state, index) for one, index in zip(known, indices, strict=True)]
     total, seen = Counter(plain), Counter[str]()
     numbered = []
     for name in plain:
         seen[name] += 1
-        alone = total[name] == 1 and name not in ("well", "saddle", "singular")
-        numbered.append(name if alone else f"{name} {seen[name]}")
+        free = total[name] == 1 and name not in ("well", "saddle", "singular")
+        numbered.append(name if free else f"{name} {seen[name]}")
     return numbered
 
 
-def _name(whole: GrippedRing, state: State, index: int | None) -> str:
-    covering = turning(whole, state)
+def _name(full: GrippedRing, state: State, index: int | None) -> str:
+    covering = turning(full, state)
     in_space = "singular" if index is None else "saddle" if index else "well"
     if covering is None:
         return in_space
-    k = curvatures(whole.rod, state) * whole.rod.cell.sum() / (2.0 * math.pi)
+    k = curvatures(full.rod, state) * full.rod.cell.sum() / (2.0 * math.pi)
     spread = np.ptp(k, axis=0)
     if covering == 0:
         bent = k[:, :2].sum(axis=1)
         changes = int(np.sum(bent * np.roll(bent, 1) < 0.0))
-        uniform = float(np.ptp(whole.rod.rest[:, 0])) < _FLAT  # else straights change sign as well
+        uniform = float(np.ptp(full.rod.rest[:, 0])) < _FLAT  # else straights change sign as well
         often = f" {changes // 2} times" if uniform and changes > 2 else ""
         return f"figure eight{often}{_rolled(k, spread, 1)}"
     number = {2: "two", 3: "three", 4: "four", 5: "five"}.get(abs(covering), str(abs(covering)))

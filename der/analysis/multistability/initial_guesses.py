@@ -22,14 +22,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from der.analysis.landscape.barrier import twisted_rests
-from der.analysis.landscape.landscape import FARTHEST, scene_sector
+from der.analysis.landscape.landscape import FARTHEST
 from der.analysis.landscape.saddle_search import displaced
-from der.continuation.arclength import follow
-from der.continuation.events import Wanted
+from der.analysis.request import Request, ring_of
 from der.continuation.roots import find_root
-from der.continuation.step import ContinuationFailed, Statistics
+from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array, turned
-from der.rod.free_ring import Alone, balance, left_alone
+from der.problem import Options
+from der.rod.free_ring import FreeRing, balance, released
 from der.rod.gripped_ring import GrippedRing
 from der.scene import Scene
 
@@ -39,59 +39,58 @@ _COVERED = 3  # times, or as often as the bar would like to
 _EDGES_A_COVER = 4  # at least
 
 
-def free_starts(scene: Scene, whole: GrippedRing) -> Iterator[Alone]:
+def free_starts(scene: Scene, full: GrippedRing) -> Iterator[FreeRing]:
     """Shapes of a ring without grips, the flat ring first."""
     wanted = math.ceil(abs(scene.ring.natural_ratio))
     most = min(max(_COVERED, wanted), scene.n_edges // _EDGES_A_COVER)
     for turns in range(1, most + 1):
-        yield covered(whole, turns)
-    yield eight(whole)
+        yield covered(full, turns)
+    yield eight(full)
     for turns in range(1, _COVERED + 1):
-        yield covered(whole, turns, math.pi)
+        yield covered(full, turns, math.pi)
     for turns in range(1, _COVERED + 1):
         tilt = _tilt(scene, turns)
         if tilt is not None:
-            yield covered(whole, turns, tilt)
-    yield eight(whole, 0.5 * math.pi)
+            yield covered(full, turns, tilt)
+    yield eight(full, 0.5 * math.pi)
     yield from twisted_rests(scene)[1]
 
 
-def gripped_starts(scene: Scene, whole: GrippedRing, gamma: float) -> Iterator[Alone]:
+def gripped_starts(scene: Scene, full: GrippedRing, gamma: float) -> Iterator[FreeRing]:
     """States on the path of twisting at a rotation of the grips, stable and unstable ones.
 
     And the mirror images of those at 2 pi - gamma: grips turned by -(2 pi - gamma) are where they
     are when turned by gamma.
     """
-    ring = scene_sector(scene, scene.sector)
+    ring = ring_of(scene)
     other = 2.0 * math.pi - gamma
-    wanted = Wanted(
-        load_max=FARTHEST,
+    request = Request(
+        gamma_max=FARTHEST,
         until_folded=max(gamma, other) <= math.pi,
         targets=(gamma, other),
         stability=False,
-        contacts=False,
-        tolerance=scene.tolerance,
-        most_steps=600,
+        self_crossings=False,
+        options=Options(tolerance=scene.tolerance, max_steps=600),
     )
     try:
-        for one in follow(ring, wanted, Statistics()):
+        for one in request.follow(ring):
             state = one.solution.state
             for load, signs in ((gamma, _AS_IS), (other, _MIRRORED)):
-                if state.load == load:
-                    alone = left_alone(ring, whole, state)
-                    quat, stretch = alone.state.quat * signs, alone.state.stretch
-                    yield balance(whole.rod, quat, stretch, whole.supports, gamma)
+                if one.solution.parameter == load:
+                    free = released(ring, full, state)
+                    quat, stretch = free.state.quat * signs, free.state.stretch
+                    yield balance(full.rod, quat, stretch, full.supports, gamma)
     except ContinuationFailed:  # what was found on the way counts
         return
 
 
-def covered(whole: GrippedRing, turns: int, roll: float = 0.0) -> Alone:
+def covered(full: GrippedRing, turns: int, roll: float = 0.0) -> FreeRing:
     """The ring wound ``turns`` times, planar, its bar rolled about its tangent [rad]."""
-    s = whole.arc_length
-    return _bent(whole, (turns - 1) * 2.0 * math.pi * s / whole.rod.cell.sum(), roll)
+    s = full.arc_length
+    return _bent(full, (turns - 1) * 2.0 * math.pi * s / full.rod.cell.sum(), roll)
 
 
-def eight(whole: GrippedRing, roll: float = 0.0) -> Alone:
+def eight(full: GrippedRing, roll: float = 0.0) -> FreeRing:
     """The ring as a planar figure eight.
 
     Notes
@@ -102,19 +101,19 @@ def eight(whole: GrippedRing, roll: float = 0.0) -> Alone:
     from scipy.special import ellipe, ellipj, ellipk
 
     m = find_root(lambda m: float(2.0 * ellipe(m) - ellipk(m)), 0.5, 0.95)
-    share = whole.arc_length / whole.rod.cell.sum()
+    share = full.arc_length / full.rod.cell.sum()
     theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * share, m)[0])
-    return _bent(whole, theta - 2.0 * math.pi * share, roll)
+    return _bent(full, theta - 2.0 * math.pi * share, roll)
 
 
-def _bent(whole: GrippedRing, more: Array, roll: float) -> Alone:
+def _bent(full: GrippedRing, more: Array, roll: float) -> FreeRing:
     """The flat ring with its tangents turned in its plane by ``more`` [rad], closed again."""
-    quat = np.empty_like(whole.start.quat)
-    for j, (flat, angle) in enumerate(zip(whole.start.quat, more, strict=True)):
+    quat = np.empty_like(full.start.quat)
+    for j, (flat, angle) in enumerate(zip(full.start.quat, more, strict=True)):
         turned(flat, np.array([angle, 0.0, 0.0]), quat[j])  # d1 is the plane's normal
         turned(quat[j], np.array([0.0, 0.0, roll]), quat[j])
-    alone = balance(whole.rod, quat, np.zeros(len(more)))
-    return displaced(alone, np.zeros(alone.supports.free.shape))
+    free = balance(full.rod, quat, np.zeros(len(more)))
+    return displaced(free, np.zeros(free.supports.free.shape))
 
 
 def _tilt(scene: Scene, turns: int) -> float | None:

@@ -10,32 +10,30 @@ used up. That there are no others is not proved, only looked for.
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from der.analysis.landscape.landscape import numerics, scene_sector
+from der.analysis.landscape.landscape import numerics
 from der.analysis.landscape.saddle_search import displaced
 from der.analysis.multistability.deflation import Known, deflated, recognised
 from der.analysis.multistability.descriptors import described, names
 from der.analysis.multistability.initial_guesses import free_starts, gripped_starts
 from der.analysis.multistability.symmetry_images import Images, images
-from der.analysis.multistability.transitions import EndState, falls
-from der.errors import STOPPED
+from der.analysis.multistability.transitions import Descent, descents
+from der.analysis.request import ring_of
+from der.errors import Reason
 from der.kernels.linking import vertices
 from der.kernels.quaternions import rotation
 from der.records.configurations import Shapes
 from der.records.states import States, Transition
-from der.rod.equilibrium import ADVICE, equilibrium
-from der.rod.free_ring import Alone
-from der.rod.gripped_ring import GrippedRing, free_ring
-from der.rod.stability import all_modes, softest_modes
+from der.rod.free_ring import FreeRing
+from der.rod.gripped_ring import GrippedRing, free_supports
 from der.scene import Scene
 from der.utils.checks import checked_number, shown
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 MOST = 200  # states that may be asked for
 WAYS = 8  # down, at most: states with more are counted and left out
@@ -72,24 +70,22 @@ def states(
         Naming the argument, its value and what is allowed.
     """
     check(scene, gamma, count)
-    began = time.perf_counter()
-    whole = scene_sector(scene, "full")
-    starts = free_starts(scene, whole) if gamma is None else gripped_starts(scene, whole, gamma)
-    supports = free_ring(whole.rod) if gamma is None else whole.supports
-    search = Search(images(whole.rod, supports, 0.0 if gamma is None else gamma), count)
-    with interrupts_between_states() as pressed:
-        for _ in search.run(starts):
-            if progress is not None:
-                progress(len(search.known))
-            if pressed:
-                break
-    found = record(scene, whole, search, gamma)
-    if pressed:
-        found = replace(found, status="interrupted", message=STOPPED)
-    elif not len(found):
-        message = f"no state was found from any start{_flat(whole, scene.tolerance)}"
-        found = replace(found, status="not converged", message=message)
-    return replace(found, solve_s=time.perf_counter() - began)
+    full = ring_of(scene, "full")
+    starts = free_starts(scene, full) if gamma is None else gripped_starts(scene, full, gamma)
+    supports = free_supports(full.rod) if gamma is None else full.supports
+    search = Search(images(full.rod, supports, 0.0 if gamma is None else gamma), count)
+
+    def tell(_: None) -> None:
+        if progress is not None:
+            progress(len(search.known))
+
+    with Run() as run:
+        run.collect(search.run(starts), tell)
+        found = record(scene, full, search, gamma)
+        if run.done and not len(found):
+            flat = _flat(full, scene.tolerance)
+            run.stop(Reason.NO_START, f"no state was found from any start{flat}")
+    return replace(found, status=run.status, message=run.message, solve_s=run.seconds)
 
 
 def check(scene: Scene, gamma: float | None, count: int) -> None:
@@ -105,9 +101,9 @@ def check(scene: Scene, gamma: float | None, count: int) -> None:
         raise ValueError(f"n_edges must be at most {_MOST_EDGES} here, got {scene.n_edges}")
 
 
-def _flat(whole: GrippedRing, tolerance: float) -> str:
+def _flat(full: GrippedRing, tolerance: float) -> str:
     """What the solver says of the flat ring, where that is not at rest."""
-    at = equilibrium(whole.rod, whole.supports, whole.start, tolerance=tolerance)
+    at = full.correct(full.start, tolerance=tolerance)
     return "" if at.converged else f"; the flat ring is no equilibrium: {at.advice}"
 
 
@@ -120,11 +116,11 @@ class Search:
     known: list[Known] = field(default_factory=list)
     indices: list[int | None] = field(default_factory=list)
     peaks: list[Known] = field(default_factory=list)  # with too many ways down
-    pushes: list[tuple[int, EndState, tuple[int, ...]]] = field(default_factory=list)
+    pushes: list[tuple[int, Descent, tuple[int, ...]]] = field(default_factory=list)
     tried: int = 0
     nowhere: int = 0
 
-    def run(self, starts: Iterator[Alone]) -> Iterator[None]:
+    def run(self, starts: Iterator[FreeRing]) -> Iterator[None]:
         """Search from each start and from all that is found, handing over after every one."""
         for start in starts:
             if len(self.known) >= self.count:
@@ -132,7 +128,7 @@ class Search:
             self._try(start)
             yield
             yield from self._push_new()
-        begun: deque[Iterator[Alone]] = deque()
+        begun: deque[Iterator[FreeRing]] = deque()
         opened = 0
         while len(self.known) < self.count and self.tried < max(_TRIES * self.count, _FEWEST_TRIES):
             while opened < len(self.known):  # those just found take their turn, lowest first
@@ -149,10 +145,10 @@ class Search:
             yield
             yield from self._push_new()
 
-    def _try(self, start: Alone) -> None:
+    def _try(self, start: FreeRing) -> None:
         self.tried += 1
         one = deflated(start, self.known + self.peaks, self.images)
-        index = None if one is None else one.alone.index()
+        index = None if one is None else one.free.index()
         if one is None:
             self.nowhere += 1
         elif index is not None and index > WAYS:
@@ -166,7 +162,7 @@ class Search:
         if at is not None:
             return at
         self.known.append(one)
-        self.indices.append(one.alone.index())
+        self.indices.append(one.free.index())
         return len(self.known) - 1
 
     def _push_new(self) -> Iterator[None]:
@@ -174,29 +170,28 @@ class Search:
         done = {start for start, _, _ in self.pushes}
         k = max(done, default=-1) + 1
         while k < len(self.known):
-            for fall in falls(self.known[k], self.indices[k] or 0, self.images):
+            for fall in descents(self.known[k], self.indices[k] or 0, self.images):
                 self.pushes.append((k, fall, tuple(self._add(rest) for rest in fall.rests)))
                 yield
             k += 1
 
-    def _beside(self, k: int) -> Iterator[Alone]:
+    def _beside(self, k: int) -> Iterator[FreeRing]:
         """Starts beside a state, near ones first."""
-        alone = self.known[k].alone
-        supports = alone.pinned()
-        _, modes = softest_modes(alone.rod, supports, all_modes(supports), alone.state, _SOFTEST)
-        length = math.sqrt(float(alone.rod.length.sum()))
+        free = self.known[k].free
+        _, modes = free.system.softest_modes(free.state, _SOFTEST)
+        length = math.sqrt(float(free.rod.length.sum()))
         for size in _SIZES:
             for mode in modes:
                 for sign in (1.0, -1.0):
-                    yield displaced(alone, sign * size * length * mode)
+                    yield displaced(free, sign * size * length * mode)
 
 
-def record(scene: Scene, whole: GrippedRing, search: Search, gamma: float | None) -> States:
+def record(scene: Scene, full: GrippedRing, search: Search, gamma: float | None) -> States:
     """The record of a search, lowest state first."""
     order = sorted(range(len(search.known)), key=lambda k: search.known[k].energy)
     known = [search.known[k] for k in order]
     indices = [search.indices[k] for k in order]
-    called = names(whole, known, indices)
+    called = names(full, known, indices)
     name = {k: called[i] for i, k in enumerate(order)}
     rows = zip(known, called, indices, strict=True)
     transitions = []
@@ -206,26 +201,26 @@ def record(scene: Scene, whole: GrippedRing, search: Search, gamma: float | None
         released = search.known[start].energy - fall.rests[-1].energy if fall.ended else None
         way = Transition(name[start], end, fall.stiffness, fall.sign, via, released)
         transitions.append((order.index(start), way))
-    about = {**numerics(scene, whole), "count": search.count}
+    about = {**numerics(scene, full), "count": search.count}
     return States(
         scene.ring.to_json(),
         asdict(scene.section),
         about,
         gamma,
-        tuple(described(whole, *row) for row in rows),
+        tuple(described(full, *row) for row in rows),
         tuple(way for _, way in sorted(transitions, key=lambda one: one[0])),
         search.tried,
         search.nowhere,
         len(search.peaks),
-        shapes=_shapes(whole, known),
+        shapes=_shapes(full, known),
     )
 
 
-def _shapes(whole: GrippedRing, known: list[Known]) -> Shapes | None:
+def _shapes(full: GrippedRing, known: list[Known]) -> Shapes | None:
     """Vertices and frames of the states."""
     if not known:
         return None
-    at = [one.alone.state for one in known]
-    x = np.array([vertices(state.quat, whole.lengths(state)) for state in at])
+    at = [one.free.state for one in known]
+    x = np.array([vertices(state.quat, full.lengths(state)) for state in at])
     frames = np.array([rotation(state.quat).swapaxes(1, 2) for state in at])
-    return Shapes(x, frames, arc_length=whole.arc_length)
+    return Shapes(x, frames, arc_length=full.arc_length)

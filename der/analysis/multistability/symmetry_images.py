@@ -9,10 +9,10 @@ where something that maps the problem on itself maps one on the other:
     shift       of the material along the curve:                   k(s) -> k(s + c)
     roll        of the bar by half a turn about its tangent:       k(s) -> (-k1, -k2, k3)(s)
 
-All but the last leave k1 alone, so that the natural curvature about d1 allows them where it is
+All but the last leave k1 free, so that the natural curvature about d1 allows them where it is
 itself the same at s + c, or at -s + c: any c on a uniform ring, half the length on an ellipse. A
 bar that is naturally straight may be rolled, and where it is as stiff one way as the other, by any
-angle: such states are compared by k1^2 + k2^2, k1 k2' - k2 k1' and k3, which that leaves alone.
+angle: such states are compared by k1^2 + k2^2, k1 k2' - k2 k1' and k3, which that leaves free.
 Grips have to be mapped on grips, and the mirror turns them the other way: it is no symmetry at a
 given rotation, but for multiples of pi. The distance is the least root mean square difference of k
 over all these, times the ring's mean radius. Over all shifts of a uniform ring it is least where

@@ -17,10 +17,8 @@ import numpy as np
 from der.analysis.multistability.deflation import Known, solved
 from der.analysis.multistability.symmetry_images import Images
 from der.kernels.quaternions import Array
-from der.rod.equilibrium import Direction
-from der.rod.free_ring import Alone, balance
-from der.rod.gradient_flow import flow
-from der.rod.stability import all_modes, softest_modes
+from der.rod.dynamics import flow
+from der.rod.free_ring import FreeRing, balance
 
 _NUDGE = 0.03  # rad, root mean square
 _TOLERANCE = 1e-6  # GJ/a, of the flow; Newton's method goes on
@@ -30,7 +28,7 @@ _MOST_STEPS = 2000  # of a flow; most take below 200
 
 
 @dataclass(frozen=True)
-class EndState:
+class Descent:
     """One push and what it led to."""
 
     stiffness: float  # of the mode pushed along
@@ -39,53 +37,52 @@ class EndState:
     ended: bool  # whether there is such a last one
 
 
-def ways_down(one: Alone, index: int) -> tuple[Array, Array]:
+def unstable_modes(one: FreeRing, index: int) -> tuple[Array, Array]:
     """Eigenvalues (m,) and modes (m, n, b) of negative stiffness, the steepest first."""
-    supports = one.pinned()
+    system = one.system
     negative = np.zeros(0, dtype=int)
     count = index + 2
     while True:
-        values, modes = softest_modes(one.rod, supports, all_modes(supports), one.state, count)
+        values, modes = system.softest_modes(one.state, count)
         negative = np.argsort(values)[: int(np.sum(values < 0.0))]
         if len(negative) >= index or count >= _MOST_MODES:
             return values[negative], modes[negative]
         count = min(2 * count, _MOST_MODES)
 
 
-def falls(one: Known, index: int, images: Images) -> Iterator[EndState]:
+def descents(one: Known, index: int, images: Images) -> Iterator[Descent]:
     """What pushes along all ways down lead to, to either side of each."""
-    values, modes = ways_down(one.alone, index)
+    values, modes = unstable_modes(one.free, index)
     for value, mode in zip(values, modes, strict=True):
         for sign in (1, -1):
             yield _fall(one, float(value), sign, mode, images)
 
 
-def _fall(one: Known, stiffness: float, sign: int, mode: Array, images: Images) -> EndState:
+def _fall(one: Known, stiffness: float, sign: int, mode: Array, images: Images) -> Descent:
     rests: list[Known] = []
     here = one
     push = sign * mode
     while len(rests) < _MOST_SADDLES:
-        landed = _landed(here.alone, push, images)
+        landed = _landed(here.free, push, images)
         if landed is None or landed.energy >= here.energy:
-            return EndState(stiffness, sign, tuple(rests), ended=False)
+            return Descent(stiffness, sign, tuple(rests), ended=False)
         rests.append(landed)
-        index = landed.alone.index()
+        index = landed.free.index()
         if index == 0:
-            return EndState(stiffness, sign, tuple(rests), ended=True)
+            return Descent(stiffness, sign, tuple(rests), ended=True)
         if index is None:
             break
-        push, here = ways_down(landed.alone, index)[1][0], landed
-    return EndState(stiffness, sign, tuple(rests), ended=False)
+        push, here = unstable_modes(landed.free, index)[1][0], landed
+    return Descent(stiffness, sign, tuple(rests), ended=False)
 
 
-def _landed(here: Alone, push: Array, images: Images) -> Known | None:
+def _landed(here: FreeRing, push: Array, images: Images) -> Known | None:
     """The equilibrium in which the flow from a push ends; None where it does not."""
     size = _NUDGE * math.sqrt(float(here.rod.length.sum()))
-    kick = Direction(size * push, np.zeros(len(here.supports.target)), 0.0)
-    fall = flow(
-        here.rod, here.supports, here.state, kick=kick, tolerance=_TOLERANCE, most=_MOST_STEPS
-    )
-    if not fall.rests:
+    system = here.unpinned
+    kick = system.increment(size * push)
+    end = flow(system, here.state, kick=kick, tolerance=_TOLERANCE, most=_MOST_STEPS)
+    if not end.rests:
         return None
-    state = fall.state
+    state = end.state
     return solved(balance(here.rod, state.quat, state.stretch, here.supports, state.load), images)
