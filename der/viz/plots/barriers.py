@@ -43,6 +43,7 @@ def draw(curves: BarrierCurves) -> Figure:
     label_axes(above, "", "to fold  $\\Delta U\\,a/GJ$")
     label_axes(below, "height over thickness of the section  $h/t$", "to open  $\\Delta U\\,a/GJ$")
     zero_line(below)
+    above.tick_params(labelbottom=False)
     below.set_xscale("log")
     below.xaxis.set_minor_locator(FixedLocator([]))
     low, high = float(curves.h_over_t.min()), float(curves.h_over_t.max())

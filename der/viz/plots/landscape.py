@@ -58,6 +58,7 @@ def draw(landscape: Landscape | BarrierCurves | Pass) -> Figure:
         _draw_curve(axes, landscape, height)
         label_axes(axes, across, up)
     zero_line(below)
+    above.tick_params(labelbottom=False)
     _fold_barrier(above, landscape)
     if zoomed:
         _saddle_and_well(figure.add_axes((0.6405, 0.165, 0.3445, 0.75)), landscape)

@@ -28,7 +28,7 @@ AXES = {
 MOST = 7  # loads of each kind whose works are shown
 SHAPES = ("force", "couple", "force dead", "couple dead")
 EVENTS = {
-    "pass": "quasi-static to a saddle",
+    "pass": "reaches a saddle",
     "fold": "snaps at a fold",
     "branch": "snaps at a branch point",
     "limit": "limit of a dead load",

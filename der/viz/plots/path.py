@@ -66,6 +66,7 @@ def draw(path: Path) -> Figure:
         label_axes(axes, across, up)
         axes.yaxis.set_label_coords(-0.062, 0.5)
     zero_line(above)
+    above.tick_params(labelbottom=False)
     below.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 2.5, 5, 10]))
     if path.shapes is not None:
         chosen = _snapshots(path, path.shapes)

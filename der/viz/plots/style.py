@@ -74,12 +74,10 @@ def blank(width: float, height: float, title: str, *, dpi: int = DPI) -> Figure:
 
 
 def label_axes(axes: Axes, across: str, up: str, *, fontsize: float = 9.0) -> None:
-    """Put labels on axes and give them the look of all pictures; "" hides the ticks' labels."""
+    """Put labels on axes and give them the look of all pictures."""
     axes.set_xlabel(across, fontsize=fontsize, color=INK)
     axes.set_ylabel(up, fontsize=fontsize, color=INK)
     axes.tick_params(labelsize=fontsize - 1.0, color=QUIET, labelcolor=INK, direction="in")
-    if not across:
-        axes.tick_params(labelbottom=False)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(QUIET)
 
