@@ -21,13 +21,18 @@ from der.scene import Scene
 from der.utils.checks import Array
 from validation.stress.random_rings import DENSE, LOOSE, largest_error, work_missing
 
-Fault = tuple[str, str]  # a name, which is a reason in the summary, and a sentence
+Fault = tuple[str, str]  # a name, which is the reason in the summary, and a sentence
 
 SAME = 1e-9  # rad: two gammas that are one
 MONOTONIC = 1e-7  # of the largest |M|: differences that are rounding
 GEOMETRY = 1e-10  # of a frame, an edge, a gap, in units of 1 and of a
 FEWEST = 4  # states in a row of which the work can be summed
 STABLE_KINDS = ("fold", "branch", "snap")  # across which the index may change
+
+
+def not_converged(reason: str) -> str:
+    """Name of the fault that a solver has given up; ``reason`` as in the record."""
+    return f"NotConverged {reason}"
 
 
 def faults(scene: Scene, path: Path) -> Iterator[Fault]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -24,12 +23,13 @@ from der.records.path import Path
 from der.rod.gripped_ring import sector
 from der.scene import CROSSINGS_UP_TO, Scene
 from der.utils.checks import Array
-from validation.stress.cases import ring_of, scene_of, section_of
+from validation.stress.cases import KINDS, scene_of
 from validation.stress.checks import (
     Fault,
     asymmetry,
     denser,
     faults,
+    not_converged,
     outside_error_bars,
     too_uncertain,
     unlike,
@@ -61,24 +61,30 @@ def _scene(parameters: Mapping[str, Any], **more: Any) -> Scene:
 
 def _folded(scene: Scene) -> Path:
     """The path, finished or not."""
+    return _finished_or_not(der.fold, scene)
+
+
+def _finished_or_not(solver: Callable[[Scene], Path], scene: Scene) -> Path:
     try:
-        return der.fold(scene)
+        return solver(scene)
     except NotConverged as failure:
-        if failure.path.status != "not converged" or failure.path.message != str(failure):
+        path = failure.path
+        if path.status != "not converged" or path.message != str(failure):
             raise AssertionError("the path that is left does not say why it is") from None
-        return failure.path
+        return path
 
 
-def _unfinished(path: Path) -> Iterator[Fault]:
+def unfinished(path: Path) -> Iterator[Fault]:
+    """Why a path is not finished."""
     if path.status != "done":
-        yield "NotConverged", path.message
+        yield not_converged(path.reason), path.message
 
 
 def _path(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     """A path, and every test that a single one can be put to."""
     scene = _scene(parameters, shapes=True)
     path = _folded(scene)
-    yield from _unfinished(path)
+    yield from unfinished(path)
     yield from _judged(scene, path)
     if scene.unload and path.status == "done" and not any(p.kind == "snap" for p in path.points):
         yield from _returned(scene, path)
@@ -105,28 +111,12 @@ def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator
     """Energy is work; where the states are too few to tell, they are asked for again, densely."""
     lost = work_lost(path)
     if lost > LOOSE and path.status == "done":
-        wants = {name: getattr(scene, name) for name in _WANTS} | {
-            "save_at": denser(path, scene.gamma_max)
-        }
-        lost = work_lost(solver(Scene(scene.ring, scene.section, **wants)), asked=True)
+        densely = replace(
+            scene, save_at=denser(path, scene.gamma_max), shapes=False, error_bars=False
+        )
+        lost = work_lost(solver(densely), asked=True)
     if lost > LOOSE and path.status == "done":
         yield "energy is not work", f"U and the integral of 4 M dgamma differ by {lost:.2g} of U"
-
-
-_WANTS = (
-    "n_edges",
-    "sector",
-    "stability",
-    "control",
-    "unload",
-    "solver",
-    "gamma_max",
-    "until",
-    "curvature",
-    "stretch",
-    "a_over_t",
-    "tolerance",
-)
 
 
 def _returned(scene: Scene, path: Path, steps: float = RETURNED) -> Iterator[Fault]:
@@ -222,11 +212,8 @@ def _bvp(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     def solver(scene: Scene) -> Path:
         return solve_bvp(scene, tolerance=tolerance)
 
-    try:
-        path = solver(scene)
-    except NotConverged as failure:
-        path = failure.path
-    yield from _unfinished(path)
+    path = _finished_or_not(solver, scene)
+    yield from unfinished(path)
     yield from (fault for fault in faults(scene, path) if tolerance < 1e-5 or fault[0] != "start")
     yield from too_uncertain(path, tolerance)
     if tolerance <= 1e-5 and len(path):
@@ -254,7 +241,7 @@ def _symmetry(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     """A path on the sector is that on the full ring."""
     found = [_folded(_scene(parameters, sector=name)) for name in ("auto", "full")]
     for path in found:
-        yield from _unfinished(path)
+        yield from unfinished(path)
     if all(path.status == "done" for path in found):
         yield from unlike(found[0], found[1], 1e-7)
 
@@ -265,7 +252,7 @@ def _steps(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     usual = _folded(scene)
     with _stepping(**parameters["steps"]):
         other = _folded(scene)
-    yield from _unfinished(other)
+    yield from unfinished(other)
     if usual.status == other.status == "done":
         yield from unlike(usual, other, 1e-7)
 
@@ -299,22 +286,7 @@ def _threads(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def _without_time(path: Path) -> str:
-    return re.sub(r'"solve_s": [^,}]*', '"solve_s": 0', path.to_json())
-
-
-def _points(parameters: Mapping[str, Any]) -> Iterator[Fault]:
-    """A ring through noisy points: refused in a sentence, or folded like any other."""
-    try:
-        ring = ring_of(parameters["ring"])
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
-    try:
-        scene = Scene(ring, section_of(parameters), shapes=True, **parameters["wants"])
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
-    path = _folded(scene)
-    yield from _unfinished(path)
-    yield from _judged(scene, path)
+    return replace(path, timing=replace(path.timing, solve_s=0.0)).to_json()
 
 
 def _scale(parameters: Mapping[str, Any]) -> Iterator[Fault]:
@@ -354,24 +326,14 @@ def _input(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 
 _TAKES_NUMBERS = ("circle", "section", "rectangular_section", "Scale", "Scale.of", "Section")
 
-_Runner = Callable[[Mapping[str, Any]], Iterator[Fault]]
-RUN: dict[str, _Runner] = {
-    "path": _path,
-    "beyond": _path,
-    "close folds": _path,
-    "natural curvature": _path,
-    "error bars": _path,
-    "angle": _path,
-    "moment": _path,
-    "relaxation": _path,
+Run = Callable[[Mapping[str, Any]], Iterator[Fault]]
+RUN: dict[str, Run] = dict.fromkeys(KINDS, _path) | {
     "bvp": _bvp,
     "compare": _compare,
     "symmetry": _symmetry,
     "steps": _steps,
     "again": _again,
     "threads": _threads,
-    "points": _points,
-    "extreme": _path,
     "scale": _scale,
     "input": _input,
 }
