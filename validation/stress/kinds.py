@@ -135,7 +135,7 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
     Its frames are taken from the record; the internal forces, which are not in it, are fitted. So
     residual, energy and moment are computed anew, and Tw + Wr.
     """
-    piece = sector(
+    ring = sector(
         scene.ring,
         scene.section,
         scene.n_edges,
@@ -144,7 +144,7 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
         stretching=scene.stretching,
     )
     raw = path.raw or {}
-    body = piece.body
+    body = ring.body
     # arc lengths are rounded, and so are cells, which are their differences
     rounding = 1e-15 * scene.ring.length * float(body.stiffness.max() / body.cell.min() ** 2)
     columns = [np.asarray(raw.get(name, getattr(path, name))) for name in _COLUMNS]
@@ -153,28 +153,30 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
     if scene.stretching and tolerance > LOOSEST:  # a gap, all in one edge, would be stretch
         return
     links = scene.n_edges <= min(256, CROSSINGS_UP_TO)
-    worst = dict.fromkeys(("residual", "energy", "moment", "link"), 0.0)
+    worst = np.zeros(len(_BALANCED))
     for k, (gamma, moment, energy) in enumerate(zip(*columns, strict=True)):
         quat = _quaternions(shapes.frames[k])
         edge = shapes.x[k] - np.roll(shapes.x[k], 1, axis=0)
         length = np.sum(edge * shapes.frames[k, :, 2], axis=1)
-        stretch = length / piece.body.length - 1.0 if scene.stretching else np.zeros(len(quat))
-        residual, noise, found_energy, found_moment = _residual(piece, quat, stretch, float(gamma))
+        stretch = length / ring.body.length - 1.0 if scene.stretching else np.zeros(len(quat))
+        residual, noise, found_energy, found_moment = _residual(ring, quat, stretch, float(gamma))
         allowed = 20.0 * max(tolerance, 10.0 * noise) + 1e-14 * scene.stretching + rounding
-        worst["residual"] = max(worst["residual"], residual / allowed)
-        off = abs(found_energy - energy) / (1e-8 * scales[2] + allowed)
-        worst["energy"] = max(worst["energy"], off)
-        off = abs(found_moment - moment) / (1e-7 * scales[1] + scene.n_edges * allowed)
-        worst["moment"] = max(worst["moment"], off)
         flat = gamma != 0.0 and float(np.ptp(shapes.x[k, :, 0])) < 1e-3
-        if links and not flat and k % 4 == 0:
-            worst["link"] = max(worst["link"], link(quat, length)[1] / (1e-8 + 100.0 * tolerance))
-    for name, size in worst.items():
+        linked = link(quat, length)[1] if links and not flat and k % 4 == 0 else 0.0
+        off = (
+            residual / allowed,
+            abs(found_energy - energy) / (1e-8 * scales[2] + allowed),
+            abs(found_moment - moment) / (1e-7 * scales[1] + scene.n_edges * allowed),
+            linked / (1e-8 + 100.0 * tolerance),
+        )
+        worst = np.maximum(worst, off)
+    for name, size in zip(_BALANCED, worst, strict=True):
         if not size <= 1.0:
             yield f"{name} of the full ring", f"{size:.3g} times what rounding allows"
 
 
 _COLUMNS = ("gamma", "moment", "energy")
+_BALANCED = ("residual", "energy", "moment", "link")
 
 
 def _quaternions(frames: Array) -> Array:
@@ -184,21 +186,21 @@ def _quaternions(frames: Array) -> Array:
 
 
 def _residual(
-    piece: Any, quat: Array, stretch: Array, gamma: float
+    ring: Any, quat: Array, stretch: Array, gamma: float
 ) -> tuple[float, float, float, float]:
     """Residual, its rounding error, energy and M of a state of the full ring."""
-    held = piece.held
+    held = ring.held
     force = np.zeros(len(held.target))
-    system = assemble(piece.body, held, quat, stretch, force, gamma)
+    system = assemble(ring.body, held, quat, stretch, force, gamma)
     free = held.free.reshape(-1)
     gradient = system.grad.reshape(-1)[free]
     border = system.border.reshape(-1, len(force))[free]
     force = -np.linalg.lstsq(border, gradient, rcond=None)[0]
-    system = assemble(piece.body, held, quat, stretch, force, gamma)
+    system = assemble(ring.body, held, quat, stretch, force, gamma)
     residual = max(
         float(np.abs(system.grad.reshape(-1)[free]).max()), float(np.abs(system.gap).max())
     )
-    return residual, system.noise, system.energy, piece.moment(system.load_grad)
+    return residual, system.noise, system.energy, ring.moment(system.load_grad)
 
 
 # --- The other kinds -------------------------------------------------------------------------
