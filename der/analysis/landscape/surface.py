@@ -14,6 +14,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,8 @@ from der.continuation.events import Visit, Wanted
 from der.continuation.step import Stuck, Tally
 from der.errors import STOPPED
 from der.kernels.quaternions import Array
-from der.records.energy_surface import Surface
+from der.records.energy_surface import NoMinimum, Surface
+from der.records.record import SolveTime
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import E3, Sector
 from der.rod.rod import State
@@ -114,20 +116,20 @@ def energy_surface(
     message = STOPPED if pressed else message
     folds = line[[k for k, one in enumerate(visits) if one.kind == "fold"]]
     return Surface(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        numerics(scene, piece) | {"shape": list(shape), "ceiling": flood.ceiling},
-        angles,
-        flood.distance,
-        *_maps(flood),
-        _reasons(flood, status),
-        (line[:, 0], line[:, 1], line[:, 2]),
-        folds,
-        line[at_rest],
-        fallen,
-        status,
-        message,
-        time.perf_counter() - started,
+        status=status,
+        message=message,
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=numerics(scene, piece) | {"shape": list(shape), "ceiling": flood.ceiling},
+        gamma=angles,
+        distance=flood.distance,
+        **_maps(flood),
+        reasons=_reasons(flood, status),
+        path=line,
+        folds=folds,
+        rests=line[at_rest],
+        snaps=fallen,
+        timing=SolveTime(time.perf_counter() - started),
     )
 
 
@@ -177,9 +179,7 @@ def _seeds(flood: Flood, visits: Sequence[Visit]) -> Iterator[tuple[Cell, State]
                 yield (i, int(np.argmin(away))), state.but(force=np.append(state.force, 0.0))
 
 
-def _maps(
-    flood: Flood,
-) -> tuple[Array, Array, Array, np.ndarray, tuple[tuple[tuple[float, ...], ...], ...]]:
+def _maps(flood: Flood) -> dict[str, Any]:
     """Energy, moment, force and index of the lowest minimum in each cell, and all energies."""
     n, m = len(flood.gamma), len(flood.distance)
     energy, moment, force = (np.full((n, m), np.nan) for _ in range(3))
@@ -195,7 +195,7 @@ def _maps(
     levels = tuple(
         tuple(tuple(one.energy for one in flood.among((i, j))) for j in range(m)) for i in range(n)
     )
-    return energy, moment, force, ways, levels
+    return {"energy": energy, "moment": moment, "force": force, "index": ways, "minima": levels}
 
 
 def _index(piece: Sector, held: Supports, state: State) -> int:
@@ -214,17 +214,19 @@ def _index(piece: Sector, held: Supports, state: State) -> int:
     return total
 
 
-def _reasons(flood: Flood, status: str) -> dict[Cell, str]:
+def _reasons(flood: Flood, status: str) -> tuple[NoMinimum, ...]:
     """Why cells have no minimum, for all of them."""
     unseen = (
         "not reached before the computation was stopped"
         if status == "interrupted"
         else "no neighbour has a minimum"
     )
-    cells = np.ndindex(len(flood.gamma), len(flood.distance))
-    return {
-        (i, j): flood.reasons.get((i, j), unseen) for i, j in cells if (i, j) not in flood.minima
-    }
+    return tuple(
+        NoMinimum(gamma, distance, flood.reasons.get((i, j), unseen))
+        for i, gamma in enumerate(flood.gamma)
+        for j, distance in enumerate(flood.distance)
+        if (i, j) not in flood.minima
+    )
 
 
 def _snaps(piece: Sector, wanted: Wanted, angles: Array, pressed: list[int]) -> tuple[Array, ...]:

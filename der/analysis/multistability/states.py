@@ -28,6 +28,7 @@ from der.errors import STOPPED
 from der.kernels.linking import vertices
 from der.kernels.quaternions import rotation
 from der.records.configurations import Shapes
+from der.records.record import SolveTime
 from der.records.states import States, Transition
 from der.rod.equilibrium import ADVICE, equilibrium
 from der.rod.free_ring import Alone
@@ -89,7 +90,7 @@ def states(
     elif not len(found):
         message = f"no state was found from any start{_flat(whole, scene.tolerance)}"
         found = replace(found, status="not converged", message=message)
-    return replace(found, solve_s=time.perf_counter() - began)
+    return replace(found, timing=SolveTime(time.perf_counter() - began))
 
 
 def check(scene: Scene, gamma: float | None, count: int) -> None:
@@ -208,15 +209,15 @@ def record(scene: Scene, whole: Sector, search: Search, gamma: float | None) -> 
         transitions.append((order.index(start), way))
     about = {**numerics(scene, whole), "count": search.count}
     return States(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        about,
-        gamma,
-        tuple(described(whole, *row) for row in rows),
-        tuple(way for _, way in sorted(transitions, key=lambda one: one[0])),
-        search.tried,
-        search.nowhere,
-        len(search.peaks),
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=about,
+        gamma=gamma,
+        states=tuple(described(whole, *row) for row in rows),
+        transitions=tuple(way for _, way in sorted(transitions, key=lambda one: one[0])),
+        tried=search.tried,
+        nowhere=search.nowhere,
+        peaks=len(search.peaks),
         shapes=_shapes(whole, known),
     )
 

@@ -38,7 +38,7 @@ def draw(surface: Surface) -> Figure:
     if not np.any(np.isfinite(surface.energy)):
         raise ValueError("surface must have a minimum in some cell to be plotted, got none")
     figure = blank(10.4, 4.7, title(surface))
-    ceiling = CEILING * float(np.nanmax(surface.path[2]))
+    ceiling = CEILING * float(np.nanmax(surface.path[:, 2]))
     norm = PowerNorm(0.7, 0.0, ceiling)
     axes = figure.add_axes((0.06, 0.175, 0.42, 0.74))
     filled = _contours(axes, surface, norm)
@@ -87,7 +87,7 @@ def _overlay(axes: Axes, surface: Surface) -> Iterator[Line2D]:
     """The path of twisting with its folds and M = 0 states, and snaps."""
     line: dict[str, Any] = {"color": INK, "linewidth": 1.5}
     edge = [withStroke(linewidth=2.8, foreground="white")]
-    turn, away, _ = surface.path
+    turn, away, _ = surface.path.T
     axes.plot(turn / math.pi, away, path_effects=edge, zorder=3, **line)
     yield entry("path of twisting", **line)
     snap: dict[str, Any] = {"color": UNSTABLE, "linewidth": 1.4}
@@ -115,7 +115,7 @@ def _relief(figure: Figure, surface: Surface, norm: PowerNorm) -> None:
     fine: dict[str, Any] = {"rcount": len(x), "ccount": len(y), "linewidth": 0.0}
     visible = np.where(height <= ceiling, height, np.nan)
     axes.plot_surface(x, y, visible, cmap=COLOURS, norm=norm, antialiased=False, alpha=0.9, **fine)
-    turn, away, energy = surface.path
+    turn, away, energy = surface.path.T
     shown = (turn >= surface.gamma[0]) & (turn <= surface.gamma[-1])
     lines = [(turn, away, np.where(shown, energy, np.nan), INK)]
     lines += [(*one.T, UNSTABLE) for one in surface.snaps]
