@@ -28,14 +28,12 @@ class Kind:
     Attributes
     ----------
     text : what is printed
-    figure : the figure
     empty : why there is nothing to draw; "" where there is
     unfinished : what is said where it is not complete, and where it is
     moving : what shows it in motion, by option
     """
 
     text: Callable[[Any], str]
-    figure: Callable[[Any], Any]
     empty: Callable[[Any], str]
     unfinished: Callable[[Any, Targets], str]
     moving: Mapping[str, Moving] = field(default_factory=dict)
@@ -62,7 +60,6 @@ def _together(place: str) -> Moving:
 
 _PATH = Kind(
     _lazy("records.text:summary"),
-    _lazy("viz.plots.path:figure_of_path"),
     lambda path: "" if len(path) > 1 else "there is no path of two states",
     lambda path, targets: f"{path.message}; {whereabouts(path, targets)}",
     {
@@ -73,7 +70,6 @@ _PATH = Kind(
 )
 _COMPARISON = Kind(
     _lazy("analysis.compare:table"),
-    _lazy("viz.plots.comparison:figure_of_comparison"),
     lambda comparison: "",
     lambda comparison, targets: "",
 )
@@ -103,9 +99,9 @@ def _play_landscape(found: Any, along: Callable[[], Any] | None, file: File) -> 
     save(landscape, file, surface=found)
 
 
-def _landscape(figure: str, empty: Callable[[Any], str]) -> Kind:
+def _landscape(empty: Callable[[Any], str]) -> Kind:
     moving = {"rrd": _play_landscape}
-    return Kind(_text_of_landscape, _lazy(figure), empty, _unfinished_landscape, moving)
+    return Kind(_text_of_landscape, empty, _unfinished_landscape, moving)
 
 
 # --- States ----------------------------------------------------------------------------------
@@ -116,37 +112,32 @@ def _unfinished_states(found: Any, targets: Targets) -> str:
     return f"{found.message}; states that were found: {len(found)}, {where}"
 
 
-def _states(text: str, figure: str) -> Kind:
+def _states(text: str) -> Kind:
     return Kind(
         _lazy(text),
-        _lazy(figure),
         lambda found: "" if len(found) else "there is no state",
         _unfinished_states,
     )
 
 
-_PLANAR = _states("records.planar_text:words", "viz.plots.planar:figure_of_planar")
+_PLANAR = _states("records.planar_text:words")
 
 KINDS = {  # by the name of the record's class
     "Path": _PATH,
     "Comparison": _COMPARISON,
     "Landscape": _landscape(
-        "viz.plots.landscape:figure_of_landscape",
         lambda found: "" if len(found.path) else "there is no state",
     ),
     "Surface": _landscape(
-        "viz.plots.energy_surface:figure_of_surface",
         lambda found: "" if found.count.any() else "there is no minimum in any cell",
     ),
     "Pass": _landscape(
-        "viz.plots.landscape:figure_of_pass",
         lambda found: "" if found.saddle is not None else "there is no saddle to cross",
     ),
     "LeastPush": _landscape(
-        "viz.plots.opening:figure_of_push",
         lambda found: "" if found.best is not None else "there is no push that opens the ring",
     ),
-    "States": _states("records.states_text:words", "viz.plots.states:figure_of_states"),
+    "States": _states("records.states_text:words"),
     "PlanarStates": _PLANAR,
     "Squeeze": _PLANAR,
 }
@@ -166,12 +157,8 @@ def writers(record: Any, beside: Any = None) -> Writers:
     beside : what is shown with it: another path; of a surface, what makes the landscape along it.
     """
     own = kind(record)
-
-    def plot(file: File) -> None:
-        _lazy("viz.plots.style:save_figure")(own.figure(record), file)
-
     moving = {option: partial(write, record, beside) for option, write in own.moving.items()}
     reason = own.empty(record)
-    drawn: Writers = dict.fromkeys(DRAWN, reason) if reason else {"plot": plot, **moving}
+    drawn: Writers = dict.fromkeys(DRAWN, reason) if reason else {"plot": record.plot, **moving}
     save_shapes = getattr(getattr(record, "shapes", None), "save", None)
     return drawn if save_shapes is None else {**drawn, "shapes": save_shapes}

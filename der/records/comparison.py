@@ -75,7 +75,7 @@ class Comparison(Record):
     """A rod's path and that of its boundary-value problem."""
 
     NAME: ClassVar[str] = "comparison"
-    PLOT: ClassVar[str] = "der.viz.plots.comparison:figure_of_comparison"
+    PLOT: ClassVar[str] = "der.viz.plots.comparison"
 
     rod: Path
     bvp: Path

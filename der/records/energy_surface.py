@@ -75,7 +75,7 @@ class Surface(Record):
 
     NAME: ClassVar[str] = "energy surface"
     KIND: ClassVar[str] = "surface"
-    PLOT: ClassVar[str] = "der.viz.plots.energy_surface:figure_of_surface"
+    PLOT: ClassVar[str] = "der.viz.plots.energy_surface"
 
     status: Status
     message: Text

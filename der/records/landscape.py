@@ -85,7 +85,7 @@ class Landscape(Record):
 
     NAME: ClassVar[str] = "landscape"
     KIND: ClassVar[str] = "landscape"
-    PLOT: ClassVar[str] = "der.viz.plots.landscape:figure_of_landscape"
+    PLOT: ClassVar[str] = "der.viz.plots.landscape"
     JOINED: ClassVar[str] = "path"
     _KNOWN: ClassVar[dict[str, Any]] = {"solver": "der", "at_pi": None, "mode": None, "error": None}
 
@@ -164,7 +164,7 @@ class BarrierCurves(Record):
 
     NAME: ClassVar[str] = "barriers over h/t"
     KIND: ClassVar[str] = "barriers"
-    PLOT: ClassVar[str] = "der.viz.plots.landscape:figure_of_barriers"
+    PLOT: ClassVar[str] = "der.viz.plots.barriers"
 
     ring: Json
     numerics: Json
@@ -222,7 +222,7 @@ class Pass(Record):
 
     NAME: ClassVar[str] = "barrier of the free ring"
     KIND: ClassVar[str] = "pass"
-    PLOT: ClassVar[str] = "der.viz.plots.landscape:figure_of_pass"
+    PLOT: ClassVar[str] = "der.viz.plots.minimum_energy_path"
 
     ring: Json
     section: Json

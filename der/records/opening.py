@@ -89,7 +89,7 @@ class LeastPush(Record):
 
     NAME: ClassVar[str] = "least push"
     KIND: ClassVar[str] = "push"
-    PLOT: ClassVar[str] = "der.viz.plots.opening:figure_of_push"
+    PLOT: ClassVar[str] = "der.viz.plots.opening"
 
     status: Status
     why: Text  # a sentence where there is none

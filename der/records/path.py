@@ -124,7 +124,7 @@ class Path(Record):
     """
 
     NAME: ClassVar[str] = "path"
-    PLOT: ClassVar[str] = "der.viz.plots.path:figure_of_path"
+    PLOT: ClassVar[str] = "der.viz.plots.path"
 
     solver: Annotated[str, one_of(SOLVERS)]
     status: Status = "done"  # what there is of an incomplete path is good

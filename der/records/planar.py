@@ -60,7 +60,7 @@ class PlanarStates(Record):
 
     NAME: ClassVar[str] = "planar states of a ring"
     KIND: ClassVar[str] = "planar"
-    PLOT: ClassVar[str] = "der.viz.plots.planar:figure_of_planar"
+    PLOT: ClassVar[str] = "der.viz.plots.planar"
 
     status: Status = "done"
     message: Text = ""
@@ -118,7 +118,7 @@ class Squeeze(Record):
 
     NAME: ClassVar[str] = "squeeze of a ring"
     KIND: ClassVar[str] = "squeeze"
-    PLOT: ClassVar[str] = "der.viz.plots.planar:figure_of_planar"
+    PLOT: ClassVar[str] = "der.viz.plots.squeeze"
 
     status: Status = "done"
     message: Text = ""

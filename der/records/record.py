@@ -1,6 +1,6 @@
 """What every record can do: be saved and loaded, drawn, and shown in a line or a small table.
 
-A record names the function that draws it by text, which is imported when the record is drawn: so
+A record names the module that draws it by text; it is imported when the record is drawn: so
 reading a file loads no matplotlib, and this package imports nothing of `der.viz`.
 """
 
@@ -41,7 +41,7 @@ class Record(Checked, Saved):
 
     NAME: ClassVar[str]  # what it is, in a word
     KIND: ClassVar[str] = ""  # the first entry; "": the file has none
-    PLOT: ClassVar[str]  # "module:function" that makes the figure of one
+    PLOT: ClassVar[str]  # the module whose function `draw` makes the figure
 
     timing: SolveTime
 
@@ -127,11 +127,9 @@ class Record(Checked, Saved):
         ValueError
             If there is nothing to draw, or the file cannot be written.
         """
-        module, function = self.PLOT.split(":")
-        figure: Figure = getattr(import_module(module), function)(self)
+        figure: Figure = import_module(self.PLOT).draw(self)
         if file is not None:
-            from_style = import_module("der.viz.plots.style")
-            from_style.save_figure(figure, file)
+            import_module("der.viz.plots.style").save(figure, file)
         return figure
 
     def __repr__(self) -> str:

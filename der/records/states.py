@@ -61,7 +61,7 @@ class States(Record):
 
     NAME: ClassVar[str] = "states of a ring"
     KIND: ClassVar[str] = "states"
-    PLOT: ClassVar[str] = "der.viz.plots.states:figure_of_states"
+    PLOT: ClassVar[str] = "der.viz.plots.states"
 
     status: Status = "done"
     message: Text = ""

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from der.records.comparison import Comparison
 from der.records.path import Path
 from der.utils.files import FilePath
 from der.viz.curve import smooth
@@ -20,7 +21,7 @@ ROD, BVP = UNSTABLE, STABLE  # colours
 FLOOR = 1e-13  # of the distances drawn: rounding
 
 
-def draw(comparison: Any) -> Figure:
+def draw(comparison: Comparison) -> Figure:
     """The picture of a comparison: M and U of both solvers over distances and their error bars.
 
     Parameters
