@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from der.analysis.compare import Comparison, compare
+    from der.analysis.compare import compare
     from der.analysis.fold import fold
     from der.analysis.landscape.barrier import barrier
     from der.analysis.landscape.landscape import landscape
@@ -25,16 +25,24 @@ if TYPE_CHECKING:
     from der.errors import Interrupted, NotConverged
     from der.geometry.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.geometry.section import Scale, Section, rectangular_section, section
+    from der.records.comparison import Comparison
     from der.records.configurations import Shapes
+    from der.records.energy_surface import Surface
+    from der.records.landscape import BarrierCurves, Landscape, Pass
+    from der.records.opening import LeastPush
     from der.records.path import Path, Point
     from der.records.planar import PlanarState, PlanarStates, Squeeze, SqueezePoint
     from der.records.states import RingState, States, Transition
     from der.scene import Scene
 
 __all__ = [
+    "BarrierCurves",
     "Comparison",
     "Interrupted",
+    "Landscape",
+    "LeastPush",
     "NotConverged",
+    "Pass",
     "Path",
     "PlanarState",
     "PlanarStates",
@@ -48,6 +56,7 @@ __all__ = [
     "Squeeze",
     "SqueezePoint",
     "States",
+    "Surface",
     "Transition",
     "__version__",
     "barrier",
@@ -73,7 +82,6 @@ __all__ = [
 
 # where each public name lives
 _HOME = {
-    "Comparison": ("der.analysis.compare", "Comparison"),
     "compare": ("der.analysis.compare", "compare"),
     "fold": ("der.analysis.fold", "fold"),
     "barrier": ("der.analysis.landscape.barrier", "barrier"),
@@ -96,7 +104,13 @@ _HOME = {
     "Section": ("der.geometry.section", "Section"),
     "rectangular_section": ("der.geometry.section", "rectangular_section"),
     "section": ("der.geometry.section", "section"),
+    "Comparison": ("der.records.comparison", "Comparison"),
     "Shapes": ("der.records.configurations", "Shapes"),
+    "Surface": ("der.records.energy_surface", "Surface"),
+    "BarrierCurves": ("der.records.landscape", "BarrierCurves"),
+    "Landscape": ("der.records.landscape", "Landscape"),
+    "Pass": ("der.records.landscape", "Pass"),
+    "LeastPush": ("der.records.opening", "LeastPush"),
     "Path": ("der.records.path", "Path"),
     "Point": ("der.records.path", "Point"),
     "PlanarState": ("der.records.planar", "PlanarState"),

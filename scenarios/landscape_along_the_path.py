@@ -35,14 +35,11 @@ beside = barriers_over(der.circle(), BESIDE, n_edges=128)
 threshold = float(np.polyval(np.polyfit(np.sqrt(beside.open), BESIDE, 3), 0.0))
 
 if __name__ == "__main__":
-    from der.viz.plots.landscape import figure_of_barriers, figure_of_landscape
-    from der.viz.plots.style import save_figure
-
     place = folder("landscape_along_the_path")
     one.save(place / "landscape.json")
-    save_figure(figure_of_landscape(one), place / "landscape.png")
+    one.plot(place / "landscape.png")
     curves.save(place / "barriers.json")
-    save_figure(figure_of_barriers(curves), place / "barriers.png")
+    curves.plot(place / "barriers.png")
     for name in ("fold", "open"):
         value, error = one.extrapolated[name]
         print(f"h/t = 8: to {name} {value:.5f} +- {error:.0e} GJ/a")

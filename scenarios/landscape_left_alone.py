@@ -32,15 +32,12 @@ twisted = landscape(scene)
 found = barrier(scene)
 
 if __name__ == "__main__":
-    from der.viz.plots.landscape import figure_of_barriers, figure_of_pass
-    from der.viz.plots.style import save_figure
-
     place = folder("landscape_left_alone")
     found.save(place / "pass.json")
-    save_figure(figure_of_pass(found), place / "pass.png")
+    found.plot(place / "pass.png")
     curves = barriers_over(ring, H_OVER_T, free=True)
     curves.save(place / "barriers.json")
-    save_figure(figure_of_barriers(curves), place / "barriers.png")
+    curves.plot(place / "barriers.png")
     for name, one in (("left alone", found), ("by twisting", twisted)):
         value, error = one.extrapolated["open"]
         print(f"to open {name}: {value:.5f} +- {error:.0e} GJ/a")

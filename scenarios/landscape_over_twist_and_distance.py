@@ -36,12 +36,9 @@ before = [n for gamma, n in zip(sheet.gamma, rows, strict=True) if gamma < secon
 least = [float(sheet.energy[:, j].min()) for j in range(len(sheet.distance))]
 
 if __name__ == "__main__":
-    from der.viz.plots.energy_surface import figure_of_surface
-    from der.viz.plots.style import save_figure
-
     place = folder("landscape_over_twist_and_distance")
     sheet.save(place / "surface.json")
-    save_figure(figure_of_surface(sheet), place / "surface.png")
+    sheet.plot(place / "surface.png")
     print(f"{sheet.energy.size} cells in {sheet.solve_s:.1f} s, {np.sum(sheet.count == 0)} empty")
     print(f"valleys before the folds {set(before)}, between them {set(between)}")
     print(f"written to {place}")

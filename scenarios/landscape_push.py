@@ -35,14 +35,11 @@ lift = struts(alone[-1], (0, N_EDGES // 3))[0]
 lifted = march(lift, rests[-1].energy, ALIKE * rests[-1].energy)
 
 if __name__ == "__main__":
-    from der.viz.plots.opening import figure_of_push
-    from der.viz.plots.style import save_figure
-
     place = folder("landscape_push")
     for ring, n_edges in ((der.circle(), 96), (der.ellipse(b_over_a=0.6), 128)):
         found = least_push(der.Scene(ring, SECTION, n_edges=n_edges, error_bars=True))
         found.save(place / f"push_{ring.shape}.json")
-        save_figure(figure_of_push(found), place / f"push_{ring.shape}.png")
+        found.plot(place / f"push_{ring.shape}.png")
         for kind in found.least:
             value, error = found.extrapolated.get(kind, (math.nan, math.nan))
             slow, dead = found.pushes[found.least[kind]], found.pushes[found.least_dead[kind]]

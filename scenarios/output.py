@@ -35,7 +35,6 @@ def write(path: Path, name: str, *, stem: str = "path") -> None:
 
     They go to the `folder` of the scenario; the shapes are STEM.npz where STEM is not "path".
     """
-    from der.viz.plots.path import save_plot
     from der.viz.rerun.recording import save_recording
 
     place = folder(name)
@@ -43,6 +42,6 @@ def write(path: Path, name: str, *, stem: str = "path") -> None:
     if path.shapes is not None:
         path.shapes.save(place / ("shapes.npz" if stem == "path" else f"{stem}.npz"))
         save_recording(path, place / f"{stem}.rrd")
-    save_plot(path, place / f"{stem}.png")
+    path.plot(place / f"{stem}.png")
     print(summary(path))
     print(f"written to {place}")

@@ -107,8 +107,6 @@ on_mesh = {
 
 def main() -> None:
     """Search over the natural curvature, draw, and say how far the thresholds are off."""
-    from der.viz.plots.states import figure_of_states
-    from der.viz.plots.style import save_figure
     from scenarios.states_plot import figure_over_curvature
 
     place = folder("states_of_natural_curvature")
@@ -119,13 +117,15 @@ def main() -> None:
         print(f"natural curvature {kappa0:g}: {len(one)} states, {len(one.minima)} minima")
         if kappa0 in SHOWN:
             one.save(place / f"states_{kappa0:g}.json")
-            save_figure(figure_of_states(one), place / f"states_{kappa0:g}.png")
+            one.plot(place / f"states_{kappa0:g}.png")
     with (place / "states.csv").open("w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["natural_curvature", "name", "energy", "index", "needs_cut"])
         for kappa0, one in sweep:
             rows.writerows([kappa0, s.name, s.energy, s.index, s.needs_cut] for s in one.states)
-    save_figure(figure_over_curvature(sweep, bar, exact), place / "states.png")
+    from der.viz.plots.style import save
+
+    save(figure_over_curvature(sweep, bar, exact), place / "states.png")
     for n in COVERS:
         for k, truth in enumerate(exact[n]):
             fine, coarse = on_mesh[64][n][k], on_mesh[32][n][k]

@@ -9,108 +9,22 @@ tangent: no interpolation. Folds and limits are compared one by one.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from der.bvp.continuation import Visit
 from der.bvp.solve import solve_visits
-from der.records.path import Path, Point
+from der.records.comparison import ComparedPoint, ComparedState, Comparison
+from der.records.path import Path
 from der.scene import Scene
-from der.utils.files import Saved
 
 TOLERANCE = 1e-10  # of the boundary-value problem: below the rod's error bars
 SAME = 1e-9  # rad: two crossings of the same gamma
 FAR = 0.05  # of the scaled plane; what lies farther apart belongs to another branch
-
-
-@dataclass(frozen=True)
-class State:
-    """A state of the rod and its counterpart."""
-
-    gamma: float  # rad
-    kind: str  # "" or the kind of special point
-    rod_moment: float  # GJ/a
-    rod_energy: float
-    bvp_moment: float
-    bvp_energy: float
-    moment_distance: float  # normal distance in (gamma/pi, M/max|M|)
-    moment_bar: float | None  # allowed there: the rod's error bars, and the other's tolerance
-    energy_distance: float
-    energy_bar: float | None
-
-    @property
-    def agrees(self) -> bool | None:
-        """Whether both distances lie within their bars; None where there are none."""
-        if self.moment_bar is None or self.energy_bar is None:
-            return None
-        return self.moment_distance <= self.moment_bar and self.energy_distance <= self.energy_bar
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A fold or limit of both paths."""
-
-    kind: str
-    rod: Point
-    bvp: Point
-    bar: float | None  # the rod's error of gamma there, rad, and the other's
-
-    @property
-    def difference(self) -> float:
-        """In gamma, rad."""
-        return abs(self.rod.gamma - self.bvp.gamma)
-
-
-@dataclass(frozen=True)
-class Comparison(Saved):
-    """A rod's path and that of its boundary-value problem."""
-
-    rod: Path
-    bvp: Path
-    states: tuple[State, ...]
-    pairs: tuple[Pair, ...]  # folds and limits, in path order
-    unmatched: int  # states of the rod, and special points of either, without a counterpart
-
-    @property
-    def within(self) -> float:
-        """Share of the states with error bars that agree within them; NaN where there are none."""
-        known = [state.agrees for state in self.states if state.agrees is not None]
-        return sum(known) / len(known) if known else math.nan
-
-    @property
-    def largest(self) -> tuple[float, float]:
-        """Largest distances in M and in U."""
-        return (
-            max((state.moment_distance for state in self.states), default=math.nan),
-            max((state.energy_distance for state in self.states), default=math.nan),
-        )
-
-    def to_json(self) -> str:
-        """JSON text: both records, and the differences."""
-        entries = {
-            "schema": 1,
-            "rod": json.loads(self.rod.to_json()),
-            "bvp": json.loads(self.bvp.to_json()),
-            "states": [asdict(state) | {"agrees": state.agrees} for state in self.states],
-            "pairs": [
-                {
-                    "kind": pair.kind,
-                    "rod_gamma": pair.rod.gamma,
-                    "bvp_gamma": pair.bvp.gamma,
-                    "difference": pair.difference,
-                    "bar": pair.bar,
-                }
-                for pair in self.pairs
-            ],
-            "unmatched": self.unmatched,
-            "within": None if math.isnan(self.within) else self.within,
-        }
-        return json.dumps(entries, allow_nan=False) + "\n"
 
 
 def compare(
@@ -170,7 +84,7 @@ def _state(
     visits: list[Visit],
     scales: tuple[float, float],
     tolerance: float,
-) -> State | None:
+) -> ComparedState | None:
     """State k of the rod beside the solution at its gamma that is nearest in M and U."""
     gamma, moment, energy = (float(getattr(rod, n)[k]) for n in ("gamma", "moment", "energy"))
 
@@ -208,7 +122,7 @@ def _state(
         bars.append((vertical + abs(steep) * horizontal) / math.hypot(1.0, steep) + tolerance)
     if max(distances) > FAR:
         return None
-    return State(
+    return ComparedState(
         gamma,
         kind,
         moment,
@@ -231,9 +145,9 @@ def _errors(rod: Path, k: int) -> Mapping[str, float] | None:
     return None if None in errors.values() else errors
 
 
-def _pairs(rod: Path, bvp: Path) -> tuple[list[Pair], int]:
+def _pairs(rod: Path, bvp: Path) -> tuple[list[ComparedPoint], int]:
     """Folds and limits of both, matched in path order; and how many are left over."""
-    pairs: list[Pair] = []
+    pairs: list[tuple[int, ComparedPoint]] = []
     alone = 0
     for kind in ("fold", "limit"):
         ours, theirs = ([p for p in path.points if p.kind == kind] for path in (rod, bvp))
@@ -244,8 +158,8 @@ def _pairs(rod: Path, bvp: Path) -> tuple[list[Pair], int]:
             errors = _errors(rod, a.position)
             solved: Mapping[str, Any] = bvp.error or {}
             bar = None if errors is None else errors["gamma"] + solved["gamma"][b.position]
-            pairs.append(Pair(kind, a, b, bar))
-    return sorted(pairs, key=lambda pair: pair.rod.position), alone
+            pairs.append((a.position, ComparedPoint(kind, a.gamma, b.gamma, bar)))
+    return [pair for _, pair in sorted(pairs, key=lambda one: one[0])], alone
 
 
 def table(comparison: Comparison) -> str:
@@ -264,7 +178,7 @@ def table(comparison: Comparison) -> str:
     for pair in comparison.pairs:
         bar = "" if pair.bar is None else f", bar {pair.bar:.1e}"
         rows.append(
-            f"{pair.kind:8}{pair.rod.gamma:12.8f}{'':14}{pair.bvp.gamma:12.8f} by bvp: "
+            f"{pair.kind:8}{pair.rod_gamma:12.8f}{'':14}{pair.bvp_gamma:12.8f} by bvp: "
             f"{pair.difference:.1e} rad apart{bar}"
         )
     moment, energy = comparison.largest

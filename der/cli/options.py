@@ -1,27 +1,18 @@
-"""Options that commands have in common: a ring, its section, a path, files; and their parsing.
-
-A command's parameters are the fields of such groups, so that commands share options and not text.
-"""
+"""Options that commands have in common: a ring and its section, and a path."""
 
 from __future__ import annotations
 
-import inspect
 import math
-from contextlib import contextmanager
-from dataclasses import MISSING, dataclass, fields
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from der.cli.output import kept, say, targets
+from der.cli.parsing import integer_option, number_option, numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from der.cli.output import Targets
     from der.geometry.ring import Ring
     from der.geometry.section import Section
-    from der.records.path import Path
     from der.scene import Scene
 
 SHAPES = {  # and the options that go with each
@@ -32,39 +23,6 @@ SHAPES = {  # and the options that go with each
     "profile": (),
 }
 NU = 0.3  # Poisson's ratio where none is given
-
-
-def number(text: str) -> float:
-    """Parse an option's number, so that a bad one is named with its value."""
-    try:
-        return float(text)
-    except ValueError:
-        raise typer.BadParameter(f"must be a number, got {text!r}") from None
-
-
-def whole(text: str) -> int:
-    """Parse an option's whole number, likewise."""
-    try:
-        return int(text)
-    except ValueError:
-        raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
-
-
-@contextmanager
-def options_named() -> Iterator[None]:
-    """Turn a ValueError about an argument into one about the option of that name."""
-    try:
-        yield
-    except ValueError as wrong:
-        words = str(wrong).split(" ", 1)
-        option = {"n_edges": "edges", "twist_axis": "axis"}.get(words[0], words[0])
-        option = "FILE" if option == "file" else f"--{option.replace('_', '-')}"
-        raise typer.TyperException(" ".join([option, *words[1:]])) from None
-
-
-def number_option(text: str, **more: Any) -> Any:
-    """An option that takes a number."""
-    return typer.Option(parser=number, help=text, **more)
 
 
 @dataclass(frozen=True)
@@ -146,7 +104,7 @@ class RingOptions:
 class PathOptions:
     """What is wanted of a path, and how it is found."""
 
-    edges: Annotated[int, typer.Option(parser=whole, help="Edges of the full ring.")] = 64
+    edges: Annotated[int, integer_option("Edges of the full ring.")] = 64
     gamma_max: Annotated[float, number_option("Where the path ends, rad.")] = math.pi
     until: Annotated[
         str | None, typer.Option(help="'folded': until the three-covered state, beyond pi too.")
@@ -193,7 +151,7 @@ class PathOptions:
             "solver": self.solver,
             "gamma_max": self.gamma_max,
             "until": self.until,
-            "save_at": _numbers("save_at", self.save_at),
+            "save_at": numbers("save_at", self.save_at),
             "curvature": self.curvature,
             "stretch": self.stretch,
             "a_over_t": ring.a_over_t,
@@ -204,103 +162,13 @@ class PathOptions:
 
 
 @dataclass(frozen=True)
-class FileOptions:
-    """What is written."""
-
-    json: Annotated[
-        str | None, typer.Option(metavar="F", help="Write the record here ('-': output).")
-    ] = None
-    plot: Annotated[
-        str | None, typer.Option(metavar="F", help="Draw the path: .png, .pdf or .svg.")
-    ] = None
-    rrd: Annotated[
-        str | None, typer.Option(metavar="F", help="Record for playback with rerun: .rrd.")
-    ] = None
-    movie: Annotated[
-        str | None, typer.Option(metavar="F", help="Film it: .gif, or .mp4 (needs ffmpeg).")
-    ] = None
-    html: Annotated[
-        str | None, typer.Option(metavar="F", help="A page to scrub in any browser: .html.")
-    ] = None
-    beside: Annotated[
-        str | None,
-        typer.Option(metavar="DIR", help="Show the ring of this --out DIR, too, where it moves."),
-    ] = None
-    out: Annotated[
-        str | None,
-        typer.Option(metavar="DIR", help="Write path.json, path.png and shapes.npz here."),
-    ] = None
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False
-
-    @property
-    def moving(self) -> bool:
-        """Whether something is written that shows how the ring moves."""
-        return any(file is not None for file in (self.rrd, self.movie, self.html))
-
-    @property
-    def drawn(self) -> bool:
-        """Whether shapes are needed."""
-        return self.moving or any(file is not None for file in (self.plot, self.out))
-
-    def targets(self) -> Targets:
-        """The files to write, after making sure that they can be written."""
-        return targets(self.json, self.plot, self.rrd, self.out, movie=self.movie, html=self.html)
-
-    def other(self) -> Path | None:
-        """The path that is to be shown beside this one."""
-        if self.beside is None:
-            return None
-        if not self.moving:
-            raise ValueError(
-                f"beside must go with --rrd, --movie or --html, got {self.beside!r} alone"
-            )
-        return kept(self.beside)
-
-
-@dataclass(frozen=True)
 class LiveOptions:
     """Watching."""
 
     live: Annotated[
         bool, typer.Option("--live", help="Serve what --rrd records for watching, until Ctrl-C.")
     ] = False
-    port: Annotated[int, typer.Option(parser=whole, help="Where --live serves.")] = 9876
-
-
-def command(app: typer.Typer, *groups: Any) -> Callable[[Callable[..., int]], Callable[..., None]]:
-    """Make a command of a function of groups of options; what it returns is the exit code.
-
-    The command's parameters are the groups' fields, so that commands share options and not text.
-    """
-
-    def wrap(function: Callable[..., int]) -> Callable[..., None]:
-        def run(**given: Any) -> None:
-            made = [group(**{f.name: given[f.name] for f in fields(group)}) for group in groups]
-            try:
-                code = function(*made)
-            except KeyboardInterrupt:  # typer would say nothing
-                say("der: stopped by the user before anything was found")
-                code = 130
-            raise typer.Exit(code)
-
-        hints = {name: h for g in groups for name, h in get_type_hints(g, None, None, True).items()}
-        parameters = [
-            inspect.Parameter(
-                f.name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=inspect.Parameter.empty if f.default is MISSING else f.default,
-                annotation=hints[f.name],
-            )
-            for group in groups
-            for f in fields(group)
-        ]
-        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = hints
-        run.__doc__ = function.__doc__
-        app.command(name=function.__name__.strip("_"))(run)
-        return run
-
-    return wrap
+    port: Annotated[int, integer_option("Where --live serves.")] = 9876
 
 
 def _section(h_over_t: float | None, alpha: float | None, beta: float | None, nu: float) -> Section:
@@ -327,13 +195,3 @@ def _section(h_over_t: float | None, alpha: float | None, beta: float | None, nu
     if beta is None:
         raise ValueError(f"beta must be given together with --alpha {alpha}, got none")
     return section(alpha, beta)
-
-
-def _numbers(name: str, text: str | None) -> tuple[float, ...] | None:
-    """The numbers in a comma-separated list."""
-    if text is None:
-        return None
-    try:
-        return tuple(float(word) for word in text.split(","))
-    except ValueError:
-        raise ValueError(f"{name} must be numbers separated by commas, got {text!r}") from None

@@ -1,10 +1,9 @@
-"""Where the command's answers go: files, checked before the work is done, and standard output."""
+"""Records and what is drawn of them go to files and to standard output; nothing found is lost."""
 
 from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Protocol, TypeAlias
@@ -47,119 +46,6 @@ def show(text: str) -> bool:
         say(f"der: could not write to standard output: {wrong.strerror}")
         return False
     return True
-
-
-# --- Before the work -------------------------------------------------------------------------
-
-
-def check_named(**given: str | None) -> None:
-    """Raise ValueError where the next option was taken for a file's name."""
-    for name, value in given.items():
-        if value is not None and value.startswith("-") and (name, value) != ("json", "-"):
-            raise ValueError(f"{name} must be a file name, got {value!r}")
-
-
-def targets(
-    json: str | None,
-    plot: str | None,
-    rrd: str | None,
-    out: str | None,
-    *,
-    movie: str | None = None,
-    html: str | None = None,
-    stem: str = "path",
-    shapes: bool = True,
-) -> Targets:
-    """The files to write, after making sure that they can be written.
-
-    A folder gets all of its own, whatever else is named.
-    """
-    check_named(json=json, plot=plot, rrd=rrd, out=out, movie=movie, html=html)
-    files: Targets = {}
-    if out is not None:
-        folder = File(out)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as wrong:
-            raise ValueError(f"out must be a folder, got {out!r}: {wrong.strerror}") from None
-        files = {"json": [folder / f"{stem}.json"], "plot": [folder / f"{stem}.png"]}
-        if shapes:
-            files["shapes"] = [folder / "shapes.npz"]
-    if plot is not None:
-        from der.viz.plots.style import FORMATS
-
-        if File(plot).suffix not in FORMATS:
-            raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
-    if rrd is not None and File(rrd).suffix != ".rrd":
-        raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
-    if movie is not None:
-        from der.viz.movie import check_movie
-
-        check_movie(movie)
-    if html is not None:
-        from der.viz.html import check_html
-
-        check_html(html)
-    named = {"json": json, "plot": plot, "rrd": rrd, "movie": movie, "html": html}
-    for name, given in named.items():
-        if given is not None and File(given) not in files.setdefault(name, []):
-            files[name].append(File(given))
-    others = [file for name, some in files.items() if name != "json" for file in some]
-    for file in files.get("json", []):
-        if file in others:
-            raise ValueError(f"json must be a file of its own, got {str(file)!r} twice")
-    for name, some in files.items():
-        for file in some:
-            if file != OUTPUT:
-                check_writable(name if name != "shapes" else "out", file)
-    return files
-
-
-def check_writable(name: str, file: File) -> None:
-    """Raise ValueError where ``file`` cannot be written, before hours are spent on it."""
-    if file.is_dir():
-        raise ValueError(f"{name} must be a file, got the folder {str(file)!r}")
-    if file.exists() and not file.is_file():  # it would be replaced by a file: /dev/null!
-        raise ValueError(f"{name} must be a regular file, got {str(file)!r}")
-    try:
-        with tempfile.TemporaryFile(dir=file.parent):
-            pass
-    except OSError as wrong:
-        raise ValueError(
-            f"{name} must be a file in a folder that can be written to, got {str(file)!r}: "
-            f"{wrong.strerror}"
-        ) from None
-
-
-def kept(folder: str) -> Path:
-    """The path that an earlier command has kept in its --out folder, with its shapes.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or none with shapes.
-    """
-    from dataclasses import replace
-
-    from der.records.configurations import Shapes
-    from der.records.path import Path
-
-    check_named(beside=folder)
-    try:
-        path = Path.load(File(folder) / "path.json")
-        path = replace(path, shapes=Shapes.load(File(folder) / "shapes.npz"))
-    except OSError as wrong:
-        raise ValueError(
-            f"beside must be a folder with path.json and shapes.npz, as --out writes, "
-            f"got {folder!r}: {wrong.strerror}"
-        ) from None
-    except ValueError as wrong:
-        raise ValueError(
-            f"beside must be a folder as --out writes, got {folder!r}: {wrong}"
-        ) from None
-    if len(path) < 2:
-        raise ValueError(f"beside must hold a path of two states at least, got {folder!r}")
-    return path
 
 
 # --- After it --------------------------------------------------------------------------------

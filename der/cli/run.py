@@ -1,94 +1,117 @@
-"""From a command's scene to its answer: solved under a progress bar, written, told."""
+"""The run loop of the terminal: a record is found under a progress bar, written, and told."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from der.cli.output import OUTPUT, deliver, keep_somewhere, places, say, show, whereabouts
+from der.cli.kinds import kind, writers
+from der.cli.output import OUTPUT, deliver, keep_somewhere, say, show
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from der.cli.output import Record, Targets, Writers
+    from der.cli.output import Targets
     from der.records.path import Path
     from der.scene import Scene
     from der.viz.rerun.recording import Live
 
+Bar: TypeAlias = Callable[[Any, int], dict[str, Any]]  # of a value and the number of values so far
+Tick: TypeAlias = Callable[[Any], object] | None  # None where nobody would see it
+CODES = {"done": 0, "interrupted": 130}  # by status; 3: not converged
 
-def follow(
-    run: Callable[[Callable[[float], object] | None], Path],
-    scene: Scene,
-    written: Targets,
-    other: Path | None,
+
+def run(
+    solve: Callable[[Tick], Any],
+    targets: Targets,
     *,
+    bar: Bar | None = None,
+    beside: Any = None,
+    partial: Targets | None = None,
     quiet: bool,
-) -> tuple[Path, int]:
-    """Follow the path, write what was asked for, and return it with the exit code.
+) -> tuple[Any, int]:
+    """Find a record, write it and what is drawn of it, and print its summary.
 
-    Where ``other`` is given, what moves shows it, too.
+    Parameters
+    ----------
+    solve : finds the record; called with what moves the progress bar.
+    targets : the files to write, by option.
+    bar : what the progress bar shows; None: there is none.
+    beside : what is shown with the record, see `writers`.
+    partial : where a path goes that was left on the way; None: to the targets.
+
+    Returns
+    -------
+    record, exit code
     """
     from der.errors import Interrupted, NotConverged
 
-    code = 0
     try:
-        with progress(scene, quiet=quiet) as tick:
-            path = run(tick)
+        with _progress(bar, quiet=quiet) as tick:
+            found = solve(tick)
     except (NotConverged, Interrupted) as unfinished:
-        path = unfinished.path
-        code = 3 if isinstance(unfinished, NotConverged) else 130
-    return path, finish(path, written, code, other, quiet=quiet)
+        found = unfinished.path
+        targets = targets if partial is None else partial
+    status = getattr(found, "status", "done")
+    if status != "done":
+        keep_somewhere(targets)
+    code = max(CODES.get(status, 3), deliver(found, targets, writers(found, beside)))
+    if status != "done":
+        say(f"der: {kind(found).unfinished(found, targets)}")
+    if quiet or OUTPUT in targets.get("json", ()):
+        return found, code
+    return found, code if show(kind(found).text(found)) else max(code, 3)
 
 
-def finish(
-    path: Path, written: Targets, code: int, other: Path | None = None, *, quiet: bool
-) -> int:
-    """Write a path, finished or not, say what there is to say, and return the exit code."""
-    from der.cli.drawings import of_path
-    from der.records.text import summary
-
-    if path.status != "done":
-        keep_somewhere(written)
-    code = max(code, deliver(path, written, of_path(path, other)))
-    if path.status != "done":
-        say(f"der: {path.message}; {whereabouts(path, written)}")
-    return _tell(lambda: summary(path), written, code, quiet=quiet)
+# --- Progress --------------------------------------------------------------------------------
 
 
-def hand_over(
-    found: Record,
-    written: Targets,
-    code: int,
-    writers: Writers,
-    text: Callable[[], str],
-    *,
-    unfinished: str = "",
-    quiet: bool,
-) -> int:
-    """Write an answer and what is drawn of it, say what there is to say; the exit code.
-
-    ``unfinished`` begins the line that says where what was found of it is.
-    """
-    if code:
-        keep_somewhere(written)
-    written_code = deliver(found, written, writers)
-    if code:
-        say(f"der: {unfinished} {places(written, shapes='shapes' in writers)}")
-    return _tell(text, written, max(code, written_code), quiet=quiet)
+def over_gamma(scene: Scene) -> Bar:
+    """A bar over gamma."""
+    return lambda gamma, states: {
+        "completed": gamma,
+        "total": scene.gamma_max,
+        "description": f"gamma = {gamma:.3f}, {states} states",
+    }
 
 
-def _tell(text: Callable[[], str], written: Targets, code: int, *, quiet: bool) -> int:
-    """Print the summary of an answer, where output is not the record's; the exit code."""
-    if quiet or OUTPUT in written.get("json", ()):
-        return code
-    return code if show(text()) else max(code, 3)
+def counted(what: str, most: int) -> Bar:
+    """A bar over things found."""
+    return lambda found, _: {
+        "completed": found,
+        "total": most,
+        "description": f"{found} {what}",
+    }
+
+
+@contextmanager
+def _progress(bar: Bar | None, *, quiet: bool) -> Iterator[Tick]:
+    """What moves a progress bar on standard error, where that is a terminal."""
+    if bar is None or quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("loading kernels (compiled once, in half a minute)", total=None)
+        count = 0
+
+        def tick(value: float) -> None:
+            nonlocal count
+            count += 1
+            progress.update(task, **bar(value, count))
+
+        yield tick
+
+
+# --- Watching --------------------------------------------------------------------------------
 
 
 def served(port: int) -> Live:
-    """What is watched while it is made, its address told."""
+    """What is watched while it is made; its address is told."""
     from der.viz.rerun.recording import Live
 
     live = Live(port)
@@ -97,52 +120,9 @@ def served(port: int) -> Live:
 
 
 def keep_showing(live: Live, path: Path) -> None:
-    """Serve the whole film until Ctrl-C."""
+    """Serve the complete path until Ctrl-C."""
     with suppress(KeyboardInterrupt):
         live.finish(path)
         say("der: the film can be watched until Ctrl-C")
         while True:
             time.sleep(3600.0)
-
-
-@contextmanager
-def progress(scene: Scene, *, quiet: bool) -> Iterator[Callable[[float], object] | None]:
-    """A progress bar over gamma, on a terminal only."""
-    with _bar(None, quiet=quiet) as update:
-        if update is None:
-            yield None
-            return
-        states = 0
-
-        def tick(gamma: float) -> None:
-            nonlocal states
-            states += 1
-            text = f"gamma = {gamma:.3f}, {states} states"
-            update(completed=gamma, total=scene.gamma_max, description=text)
-
-        yield tick
-
-
-@contextmanager
-def counted(what: str, most: int, *, quiet: bool) -> Iterator[Callable[[int], object] | None]:
-    """A progress bar over things found, on a terminal only."""
-    with _bar(most, quiet=quiet) as update:
-        if update is None:
-            yield None
-        else:
-            yield lambda found: update(completed=found, description=f"{found} {what}")
-
-
-@contextmanager
-def _bar(total: float | None, *, quiet: bool) -> Iterator[Callable[..., object] | None]:
-    """What moves a progress bar on standard error; None where nobody would see it."""
-    if quiet or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("loading kernels (compiled once, in half a minute)", total=total)
-        yield partial(bar.update, task)

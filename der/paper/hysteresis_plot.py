@@ -14,13 +14,15 @@ from der.paper import canvas
 from der.paper.cases import Array
 from der.paper.hysteresis import Loop
 from der.records.path import Path
+from der.viz import palette
 from der.viz.curve import smooth
 from der.viz.plots import style
+from der.viz.titles import ring_text, section_text
 
 LINES: tuple[tuple[str, str, Any, float], ...] = (  # label, colour, style, width
     ("equilibria", "#9ec9e8", "-", 3.2),
     ("loading", canvas.INK, (0, (4.0, 1.8)), 1.3),
-    ("unloading", style.UNSTABLE, (0, (1.0, 1.4)), 1.7),
+    ("unloading", palette.UNSTABLE, (0, (1.0, 1.4)), 1.7),
 )
 STAR = style.mark("*", 8.0) | {"zorder": 5}
 ROWS = (("moment", "$M\\,a/GJ$"), ("energy", "$U\\,a/GJ$"))
@@ -36,7 +38,7 @@ def figure_of_loops(loops: list[Loop]) -> Figure:
         axes = [figure.add_subplot(grid[row, column]) for row in range(2)]
         for panel, (name, label) in zip(axes, ROWS, strict=True):
             _draw(panel, loop, name)
-            style.dress(panel, label if column == 0 else "")
+            style.label_axes(panel, "", label if column == 0 else "")
         if _is_small(loop):
             _zoom(axes[1], loop)
         axes[0].set_title(_title(loop), fontsize=8.5, color=canvas.INK)
@@ -55,7 +57,7 @@ def figure_of_loops(loops: list[Loop]) -> Figure:
 
 def _title(loop: Loop) -> str:
     """Ring and section, and the work of the loop."""
-    ring, section = style.about(loop.turned.ring, loop.turned.section)
+    ring, section = ring_text(loop.turned.ring), section_text(loop.turned.section, nu=False)
     spent = f"loop {loop.work:.4f}, snaps release {sum(loop.released):.4f} $GJ/a$"
     return f"{ring}\n{section}; {spent}"
 
@@ -69,7 +71,7 @@ def _zoom(panel: Axes, loop: Loop) -> None:
     """The energies of the loop, larger, where there is room."""
     inset = panel.inset_axes((0.58, 0.08, 0.4, 0.42))
     _draw(inset, loop, "energy")
-    style.dress(inset, "")
+    style.label_axes(inset, "", "")
     landed = [snap.position for snap in loop.snaps]
     at = [*landed, *(k - 1 for k in landed)]
     for set_limits, values in (

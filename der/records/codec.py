@@ -1,209 +1,110 @@
-"""Records of landscapes as JSON, one entry a line, and back; free of kernels.
+"""Reading of every record: objects of plain JSON values.
 
-A float is written by repr and comes back bit for bit; NaN is null. What is read is checked entry by
-entry, so that a damaged file is refused in one line that says where.
+cattrs builds the nested objects and keeps the place of what is wrong; the entries themselves are
+checked by the objects, and written by `der.records.entries.plain`. cattrs is imported when
+something is read, since that takes as long as the rest of a record.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Self, TypeVar
+from collections.abc import Callable
+from dataclasses import fields
+from functools import cache
+from inspect import isclass
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-import numpy as np
+from der.records.entries import Checked, entry_of, written
+from der.utils.checks import shown
 
-from der.utils import checks
-from der.utils.checks import Array, optional
-from der.utils.files import Kept, json_entries, json_lines
-
-SCHEMA = 1
-T = TypeVar("T")
-
-
-class OnDisk(Kept):
-    """A record that writes itself as JSON, one entry a line, and reads itself again."""
-
-    KIND: ClassVar[str]  # the first entry: what it is a record of
-
-    def entries(self) -> dict[str, object]:
-        """What is written, by name."""
-        raise NotImplementedError
-
-    @classmethod
-    def of_entries(cls, entries: Entries) -> Self:
-        """The record of what was written."""
-        raise NotImplementedError
-
-    def to_json(self) -> str:
-        """JSON text of schema 1."""
-        return json_lines({"kind": self.KIND, "schema": SCHEMA, **self.entries()})
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Record of a JSON text.
-
-        Raises
-        ------
-        ValueError
-            If it is not JSON, of another kind or schema, or not such a record; the message says
-            where.
-        """
-        given = json_entries(text)
-        if "kind" not in given:
-            raise ValueError(f"not a record of {cls.KIND}")
-        if (kind := given.pop("kind")) != cls.KIND:
-            raise ValueError(f"kind is {checks.shown(kind)}, not {cls.KIND!r}")
-        if (schema := given.pop("schema", None)) != SCHEMA:
-            raise ValueError(f"schema is {checks.shown(schema)}, this version reads {SCHEMA}")
-        entries = Entries("", given)
-        record = cls.of_entries(entries)
-        entries.end()
-        return record
+Kind = TypeVar("Kind", bound=Checked)
 
 
-class Entries:
-    """Entries of a JSON object that are taken one by one, each in its proper type.
+class _Misplaced(ValueError):
+    """A value that cannot stand where it stands; the message goes on after the place."""
 
-    All methods raise ValueError with the place of an entry that is missing or wrong.
+
+def record_of(kind: type[Kind], values: Any) -> Kind:
+    """Object of a class, of plain JSON values.
+
+    Raises
+    ------
+    ValueError
+        Where an entry is missing, unknown, or not what its type says; the message begins with its
+        place, such as ``points[3].gamma``.
     """
+    from cattrs import BaseValidationError
 
-    def __init__(self, where: str, given: object) -> None:
-        if not isinstance(given, Mapping):
-            raise ValueError(f"{where} must be an object, got {checks.shown(given)}")
-        self._where = where
-        self._left = dict(given)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Entries that are left."""
-        return tuple(self._left)
-
-    def take(self, name: str, check: Callable[[str, Any], T]) -> T:
-        """One entry that passes a check, such as `checks.text`."""
-        place = f"{self._where}.{name}" if self._where else name
-        if name not in self._left:
-            raise ValueError(f"{place} is missing")
-        return check(place, self._left.pop(name))
-
-    def number(self, name: str) -> float:
-        """A finite number."""
-        return self.take(name, checks.checked_number)
-
-    def number_or_none(self, name: str) -> float | None:
-        """A finite number, or null."""
-        return self.take(name, optional(checks.checked_number))
-
-    def count(self, name: str) -> int:
-        """A whole number >= 0."""
-        return self.take(name, checks.count)
-
-    def count_or_none(self, name: str) -> int | None:
-        """A whole number >= 0, or null."""
-        return self.take(name, optional(checks.count))
-
-    def whole(self, name: str) -> int:
-        """A whole number of either sign."""
-        return self.take(name, _whole)
-
-    def whole_or_none(self, name: str) -> int | None:
-        """A whole number of either sign, or null."""
-        return self.take(name, optional(_whole))
-
-    def text(self, name: str) -> str:
-        """A string."""
-        return self.take(name, checks.text)
-
-    def truth(self, name: str) -> bool:
-        """True or false."""
-        return self.take(name, checks.truth)
-
-    def mapping(self, name: str) -> dict[str, Any]:
-        """An object, as it is."""
-        return self.take(name, checks.json_object)
-
-    def array(self, name: str, *shape: int | str) -> Array:
-        """Numbers of a shape as `checks.checked_array` takes it; null becomes NaN."""
-        return self.take(name, lambda place, values: array_with_nulls(place, values, shape))
-
-    def inside(self, name: str) -> Entries:
-        """The entries of an object."""
-        return self.take(name, Entries)
-
-    def each(self, name: str, build: Callable[[Entries], T]) -> tuple[T, ...]:
-        """What is built of every object of a list."""
-        return tuple(self.take(name, lambda at, v: checks.each(at, v, _built(build))))
-
-    def end(self) -> None:
-        """Refuse what was not taken."""
-        for name in self._left:
-            place = f"{self._where}.{name}" if self._where else name
-            raise ValueError(f"{place} is no entry of such a record")
-
-
-def _whole(name: str, given: Any) -> int:
-    return int(checks.checked_number(name, given, "a whole number", float.is_integer))
-
-
-def _built(build: Callable[[Entries], T]) -> Callable[[str, Any], T]:
-    def check(where: str, given: Any) -> T:
-        entries = Entries(where, given)
-        found = build(entries)
-        entries.end()
-        return found
-
-    return check
-
-
-def array_with_nulls(name: str, values: Any, shape: tuple[int | str, ...]) -> Array:
-    """Nested lists of numbers and null as an array, null as NaN; letters in a shape are free."""
-    if len(shape) > 1:
-        rows = checks.each(name, values, lambda at, v: array_with_nulls(at, v, shape[1:]))
-        _check_length(name, len(rows), shape[0])
-        for i, row in enumerate(rows):
-            if row.shape != rows[0].shape:
-                raise ValueError(f"{name}[{i}] has shape {row.shape}, {name}[0] {rows[0].shape}")
-        inner = [n if isinstance(n, int) else 0 for n in shape[1:]]
-        return np.array(rows) if rows else np.zeros((0, *inner))
-    numbers = checks.each(name, values, optional(checks.checked_number))
-    _check_length(name, len(numbers), shape[0])
-    return np.array([np.nan if v is None else v for v in numbers], dtype=float)
-
-
-def _check_length(name: str, length: int, wanted: int | str) -> None:
-    if isinstance(wanted, int) and length != wanted:
-        raise ValueError(f"{name} must have {wanted} entries, got {length}")
-
-
-def with_nulls(values: Array) -> object:
-    """Nested lists with None for NaN."""
-    if values.ndim > 1:
-        return [with_nulls(row) for row in values]
-    return [None if np.isnan(value) else float(value) for value in values]
-
-
-def with_errors(values: Mapping[str, tuple[float, float]]) -> object:
-    """Objects of value and error; None without any."""
-    return {n: {"value": v, "error": e} for n, (v, e) in values.items()} or None
-
-
-def errors_of(name: str, given: Any) -> dict[str, tuple[float, float]]:
-    """Values and errors that `with_errors` wrote."""
-    found: dict[str, tuple[float, float]] = {}
-    for key, entry in ({} if given is None else checks.json_object(name, given)).items():
-        entries = Entries(f"{name}.{key}", entry)
-        found[key] = entries.number("value"), entries.number("error")
-        entries.end()
+    try:
+        found: Kind = _converter().structure(values, kind)
+    except (BaseValidationError, ValueError) as problem:
+        raise ValueError(_fault(problem)) from None
     return found
 
 
-def seconds(entries: Entries) -> float:
-    """The time that a record says it took."""
-    timing = entries.inside("timing")
-    found = timing.number("solve_s")
-    timing.end()
-    return found
+@cache
+def _converter() -> Any:
+    """The converter, with hooks for entries, tuples and objects."""
+    from cattrs import Converter
+    from cattrs.gen import make_dict_structure_fn, override
+
+    converter = Converter(detailed_validation=True)
+
+    def of_tuple(hint: Any) -> Callable[[Any, Any], Any]:
+        many: Any = list.__class_getitem__(get_args(hint)[0])
+        return lambda value, _: tuple(converter.structure(_a(list, value), many))
+
+    def of_object(kind: Any) -> Callable[[Any, Any], Any]:
+        hints = get_type_hints(kind, include_extras=True)
+        for one in fields(kind):  # of which cattrs would take the bare type
+            one.type = hints[one.name]
+        left_out = {one.name for one in fields(kind)} - set(written(kind))
+        omitted: dict[str, Any] = {name: override(omit=True) for name in left_out}
+        build = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True, **omitted)
+        return lambda value, _: build(kind.from_disk(dict(_a(dict, value))), kind)
+
+    # the last one that fits is taken
+    converter.register_structure_hook_factory(_is_tuple, of_tuple)
+    converter.register_structure_hook_factory(
+        lambda hint: isclass(hint) and issubclass(hint, Checked), of_object
+    )
+    converter.register_structure_hook_func(
+        lambda hint: not _is_tuple(hint) and entry_of(hint) is not None,
+        lambda value, _: value,
+    )
+    return converter
 
 
-def sentences(name: str, given: Any) -> dict[str, str]:
-    """An object of texts."""
-    found = checks.json_object(name, given)
-    return {key: checks.text(f"{name}.{key}", value) for key, value in found.items()}
+def _is_tuple(hint: Any) -> bool:
+    origin: object = get_origin(hint)
+    return origin is tuple
+
+
+def _a(kind: type, value: Any) -> Any:
+    """The value, if it is a list or an object."""
+    if isinstance(value, kind):
+        return value
+    raise _Misplaced(f"must be {'a list' if kind is list else 'an object'}, got {shown(value)}")
+
+
+def _fault(problem: BaseException) -> str:
+    """The first thing that is wrong, after its place."""
+    from cattrs import BaseValidationError, ForbiddenExtraKeysError
+    from cattrs.errors import AttributeValidationNote, IterableValidationNote
+
+    place = ""
+    while isinstance(problem, BaseValidationError):
+        noted, others = problem.group_exceptions()  # type: ignore[attr-defined]
+        kind: Any = problem.cl
+        problem, note = noted[0] if noted else (others[0], None)
+        if isinstance(note, IterableValidationNote):
+            place += f"[{note.index}]"
+        elif isinstance(note, AttributeValidationNote) and note.name != kind.JOINED:
+            place += f".{note.name}" if place else note.name
+    if isinstance(problem, KeyError):
+        return f"{place} is missing"
+    if isinstance(problem, _Misplaced):
+        return f"{place} {problem}"
+    before = f"{place}." if place else ""
+    if isinstance(problem, ForbiddenExtraKeysError):
+        return f"{before}{min(problem.extra_fields)} is no entry of such a record"
+    return before + " ".join(str(problem).split())

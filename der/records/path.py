@@ -1,4 +1,4 @@
-"""The record: a path of equilibria with its special points, on disk and back.
+"""The record of a path of equilibria with its special points.
 
 Free of kernels, and the same for both solvers. The JSON format is a contract (see the README):
 every float is written by repr and comes back bit for bit; a number that is not finite is refused
@@ -7,33 +7,44 @@ where it enters, by name. Angles in radians, moments in GJ/a, energies of the fu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any, Self
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from der.errors import Reason
 from der.records.configurations import Shapes
+from der.records.entries import (
+    Checked,
+    Column,
+    Count,
+    Json,
+    Number,
+    Text,
+    Truth,
+    along,
+    in_memory,
+    indices,
+    one_of,
+)
+from der.records.record import Record, SolveTime, Status
 from der.utils import checks
 from der.utils.checks import Array, Counts, optional
-from der.utils.files import Kept, json_entries, json_lines
 
-SCHEMA = 1
 SOLVERS = ("der", "bvp")
 KINDS = ("fold", "limit", "branch", "snap", "contact")
 SNAPPING = ("none", "snap-through", "snap-back")
 REASONS = ("", *(reason.word for reason in Reason))
-STATUSES = ("done", "not converged", "interrupted")
-ARRAYS = ("gamma", "moment", "energy", "index", "index_moment")
+NUMBERS = ("gamma", "moment", "energy")
 ARRIVAL = 1e-9  # rad; a path is solved for at pi to 1e-10
 NO_MOMENT = 1e-6  # of the largest |M|; the folded ring is planar to the same
 
 
 @dataclass(frozen=True)
-class Point:
+class Point(Checked):
     """A special point of a path; `details` are written flat into its JSON object.
 
     Raises
@@ -43,74 +54,68 @@ class Point:
         detail has the name of another entry.
     """
 
-    kind: str
-    gamma: float  # rad
-    moment: float  # GJ/a
-    energy: float  # GJ/a
-    index_before: int | None  # None: not known
-    index_after: int | None
-    position: int  # of its state in the path's arrays
-    details: Mapping[str, object] = field(default_factory=dict, hash=False)
+    kind: Annotated[str, one_of(KINDS)]
+    gamma: Number  # rad
+    moment: Number  # GJ/a
+    energy: Number  # GJ/a
+    index_before: Count | None  # None: not known
+    index_after: Count | None
+    position: Count  # of its state in the path's arrays
+    details: Json = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        checks.one_of("kind", self.kind, KINDS)
-        _check(self, checks.checked_number, "gamma", "moment", "energy")
-        _check(self, optional(checks.count), "index_before", "index_after")
-        _check(self, checks.count, "position")
-        _check(self, checks.json_object, "details")
+        super().__post_init__()
         if clash := sorted(set(self.details) & {entry.name for entry in fields(self)}):
             raise ValueError(f"details cannot hold {clash}: the point has such entries")
 
+    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries with the details among them."""
+        return entries | entries.pop("details")
+
+    @classmethod
+    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries with the surplus ones as details."""
+        own = {entry.name for entry in fields(cls)} - {"details"}
+        known = {name: entries.pop(name) for name in own & set(entries)}
+        return known | {"details": entries}
+
 
 @dataclass(frozen=True)
-class AtPi:
+class AtPi(Checked):
     """The state at the first arrival at gamma = pi; indices are None where not known."""
 
-    moment: float  # GJ/a
-    slope: float  # dM/dgamma
-    energy: float  # GJ/a
-    index: int | None  # gamma held
-    index_moment: int | None  # moment held
-    index_free: int | None  # grips removed
-
-    def __post_init__(self) -> None:
-        _check(self, checks.checked_number, "moment", "slope", "energy")
-        _check(self, optional(checks.count), "index", "index_moment", "index_free")
+    moment: Number  # GJ/a
+    slope: Number  # dM/dgamma
+    energy: Number  # GJ/a
+    index: Count | None  # gamma held
+    index_moment: Count | None  # moment held
+    index_free: Count | None  # grips removed
 
 
 @dataclass(frozen=True)
-class Mode:
+class Mode(Checked):
     """How a ring folds: the folding modes of the paper, judged at the first arrival at pi."""
 
-    foldable: bool
-    stable: bool | None  # None: not foldable
-    snapping: str  # one of SNAPPING
-    stable_3d: bool | None  # None: not known
-
-    def __post_init__(self) -> None:
-        checks.one_of("snapping", self.snapping, SNAPPING)
-        _check(self, checks.truth, "foldable")
-        _check(self, optional(checks.truth), "stable", "stable_3d")
+    foldable: Truth
+    stable: Truth | None  # None: not foldable
+    snapping: Annotated[str, one_of(SNAPPING)]
+    stable_3d: Truth | None  # None: not known
 
 
 @dataclass(frozen=True)
-class Timing:
+class Timing(SolveTime):
     """What the path cost."""
 
-    solve_s: float
-    newton_iterations: int
-    steps: int
-
-    def __post_init__(self) -> None:
-        _check(self, checks.checked_number, "solve_s")
-        _check(self, checks.count, "newton_iterations", "steps")
+    newton_iterations: Count
+    steps: Count
 
 
-@dataclass(frozen=True, eq=False)
-class Path(Kept):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Path(Record):
     """A path of equilibria, the answer of either solver; compare two by their `to_json`.
 
-    Mappings are of JSON's types: str keys; str, bool, int, float, None, lists, mappings.
+    `load` reads what `save` or ``der fold --out`` has written. Mappings are of JSON's types: str
+    keys; str, bool, int, float, None, lists, mappings.
 
     Raises
     ------
@@ -118,57 +123,67 @@ class Path(Kept):
         If lengths, kinds or types are others, or a number is not finite; the message names it.
     """
 
-    solver: str  # one of SOLVERS
-    ring: Mapping[str, object]  # the statement, as in its JSON form
-    section: Mapping[str, object]
-    numerics: Mapping[str, object]
-    gamma: Array  # (n,) rad, in path order; with error bars the extrapolated values
-    moment: Array  # (n,) GJ/a, of one arm
-    energy: Array  # (n,) GJ/a, of the full ring
-    index: Counts  # (n,) negative eigenvalues with gamma held; masked where not known
-    index_moment: Counts  # (n,) the same with the moment held
+    NAME: ClassVar[str] = "path"
+    PLOT: ClassVar[str] = "der.viz.plots.path"
+
+    solver: Annotated[str, one_of(SOLVERS)]
+    status: Status = "done"  # what there is of an incomplete path is good
+    message: Text = ""  # a sentence about the status
+    reason: Annotated[str, one_of(REASONS)] = ""  # why it ended: `word` of a der.errors.Reason
+    ring: Json  # the statement, as in its JSON form
+    section: Json
+    numerics: Json
+    gamma: Column  # (n,) rad, in path order; with error bars the extrapolated values
+    moment: Annotated[Array, along("gamma")]  # GJ/a, of one arm
+    energy: Annotated[Array, along("gamma")]  # GJ/a, of the full ring
+    index: Annotated[Counts, indices("gamma")]  # negative eigenvalues with gamma held
+    index_moment: Annotated[Counts, indices("gamma")]  # the same with the moment held
     points: tuple[Point, ...]  # special points
     at_pi: AtPi | None  # None where the path never reached pi; so for the mode
     mode: Mode | None  # see `folding_mode`
-    error: Mapping[str, object] | None  # None, or gamma, moment, energy: n numbers or None; and how
+    error: Json | None  # None, or gamma, moment, energy: n numbers or None; and how
+    raw: Json | None = None  # with error bars: values at the finest N, by name
     timing: Timing
-    shapes: Shapes | None = None  # not in the JSON
-    status: str = "done"  # one of STATUSES; what there is of an incomplete path is good
-    message: str = ""  # a sentence about the status
-    reason: str = ""  # why it ended: the `word` of a der.errors.Reason; "" where it is just done
-    raw: Mapping[str, object] | None = None  # with error bars: values at the finest N, by name
+    shapes: Shapes | None = in_memory()
 
     def __post_init__(self) -> None:
-        checks.one_of("solver", self.solver, SOLVERS)
-        checks.one_of("status", self.status, STATUSES)
-        _check(self, checks.text, "message")
-        checks.one_of("reason", self.reason, REASONS)
-        _check(self, checks.json_object, "ring", "section", "numerics")
-        _check(self, optional(checks.json_object), "error", "raw")
-        _check(self, checks.numbers, "gamma", "moment", "energy")
-        _check(self, checks.counts, "index", "index_moment")
-        object.__setattr__(self, "points", tuple(self.points))
-        self._check_lengths()
-
-    def _check_lengths(self) -> None:
-        """Refuse what is not one entry a state, or points at a state that is not there."""
-        entries = {name: getattr(self, name) for name in ARRAYS}
+        super().__post_init__()
+        known = {}
         if self.error is not None:
-            for name in ("gamma", "moment", "energy"):
-                where = f"error.{name}"
-                bars = checks.each(where, self.error.get(name), optional(checks.checked_number))
-                entries[where] = bars
+            for name in NUMBERS:
+                bars = self.error.get(name)
+                known[f"error.{name}"] = checks.each(
+                    f"error.{name}", bars, optional(checks.checked_number)
+                )
         if self.shapes is not None:
-            entries["shapes"] = self.shapes.x
-        for name, values in entries.items():
-            if len(values) != len(self):
-                raise ValueError(f"{name} has {len(values)} entries, gamma has {len(self)}")
+            known["shapes"] = list(self.shapes.x)
+        for name, values in known.items():
+            self._check_lengths(name, values, ("gamma",))
         for i, point in enumerate(self.points):
             if point.position >= len(self):
                 raise ValueError(f"points[{i}].position is {point.position} of {len(self)} states")
 
+    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries, without the raw values where there are none."""
+        if self.raw is None:
+            del entries["raw"]
+        return super().on_disk(entries)
+
     def __len__(self) -> int:
         return len(self.gamma)
+
+    def facts(self) -> dict[str, str]:
+        """Which ring, how it folds, and how far the path goes."""
+        top = f"gamma to {self.gamma.max():.6g}" if len(self) else "no gamma"
+        found = {"solver": self.solver, "ring": str(self.ring.get("shape")), "reach": top}
+        if self.mode is not None:
+            foldable = "foldable" if self.mode.foldable else "not foldable"
+            found["mode"] = f"{foldable}, snapping {self.mode.snapping}"
+        return found | {
+            "states": f"{len(self)} states",
+            "points": f"{len(self.points)} special points",
+            "status": self.status,
+        }
 
     @property
     def folds(self) -> tuple[Point, ...]:
@@ -197,49 +212,6 @@ class Path(Kept):
         """The same path as one that the user stopped."""
         why = Reason.INTERRUPTED
         return replace(self, status="interrupted", message=why.value, reason=why.word)
-
-    def to_json(self) -> str:
-        """JSON text of schema 1, one entry a line."""
-        entries: dict[str, object] = {"schema": SCHEMA, "solver": self.solver}
-        for name in ("status", "message", "reason", "ring", "section", "numerics"):
-            entries[name] = getattr(self, name)
-        for name in ARRAYS:
-            entries[name] = getattr(self, name).tolist()  # masked becomes None
-        entries["points"] = [flat_point(point) for point in self.points]
-        entries["at_pi"] = None if self.at_pi is None else vars(self.at_pi)
-        entries["mode"] = None if self.mode is None else vars(self.mode)
-        entries["error"] = self.error
-        if self.raw is not None:
-            entries["raw"] = self.raw
-        entries["timing"] = vars(self.timing)
-        return json_lines(entries)
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Path of a JSON text.
-
-        Raises
-        ------
-        ValueError
-            If it is not JSON, of another schema, or not such a record; the message says where.
-        """
-        entries = json_entries(text)
-        if "kind" in entries:  # of landscapes and states
-            raise ValueError(f"not a path but a record of kind {checks.shown(entries['kind'])}")
-        if (schema := entries.pop("schema", None)) != SCHEMA:
-            raise ValueError(f"schema is {schema!r}, this version reads {SCHEMA}")
-        if not isinstance(entries.get("points"), list):
-            raise ValueError("points is missing or not a list")
-        points = enumerate(entries["points"])
-        entries["points"] = [point_of(f"points[{i}]", point) for i, point in points]
-        for name, kind in (("at_pi", AtPi), ("mode", Mode)):
-            if entries.get(name) is not None:
-                entries[name] = built(kind, name, entries[name])
-        entries["timing"] = built(Timing, "timing", entries.get("timing"))
-        if "shapes" in entries:
-            raise ValueError("shapes have no place in the JSON")
-        path: Self = built(cls, "record", entries)
-        return path
 
 
 def folding_mode(
@@ -300,36 +272,3 @@ def release() -> str:
 def counts(values: Iterable[int | None]) -> Counts:
     """Masked integer array of counts, of which None is not known."""
     return checks.counts("counts", list(values))
-
-
-def _check(record: object, check: Callable[[str, Any], object], *names: str) -> None:
-    """Replace entries of a frozen record by their checked values."""
-    for name in names:
-        object.__setattr__(record, name, check(name, getattr(record, name)))
-
-
-def flat_point(point: Point) -> dict[str, object]:
-    """A special point as it is written, its details among its entries."""
-    entries = dict(vars(point))
-    return entries | entries.pop("details")
-
-
-def point_of(where: str, entries: Any) -> Point:
-    """Point of its JSON object, whose surplus entries are the details."""
-    if not isinstance(entries, dict):
-        raise ValueError(f"{where} is {entries!r}, not an object")
-    own = {entry.name for entry in fields(Point)} - {"details"}
-    known = {name: value for name, value in entries.items() if name in own}
-    details = {name: value for name, value in entries.items() if name not in own}
-    point: Point = built(Point, where, known | {"details": details})
-    return point
-
-
-def built(kind: Callable[..., Any], where: str, entries: Any) -> Any:
-    """Record of a JSON object; a missing, surplus or wrong entry is refused with its place."""
-    if not isinstance(entries, dict):
-        raise ValueError(f"{where} is {entries!r}, not an object")
-    try:
-        return kind(**entries)
-    except (TypeError, ValueError) as problem:  # TypeError: "... missing 1 required ...: 'solver'"
-        raise ValueError(f"{where}: {' '.join(str(problem).split())}") from problem

@@ -7,7 +7,7 @@ import os
 import pathlib
 import secrets
 from collections.abc import Callable, Mapping
-from typing import Any, BinaryIO, Self, TypeAlias
+from typing import Any, BinaryIO, TypeAlias
 
 FilePath: TypeAlias = str | os.PathLike[str]
 
@@ -31,33 +31,6 @@ class Saved:
         write_whole(path, lambda file: file.write(content))
 
 
-class Kept(Saved):
-    """A record that also reads itself again."""
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Record of a JSON text; ValueError, with the place, if there is none in it."""
-        raise NotImplementedError
-
-    @classmethod
-    def load(cls, path: FilePath) -> Self:
-        """Record of a JSON file.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be read.
-        ValueError
-            If it is broken or of another kind or schema; the message names the file and what is
-            wrong.
-        """
-        content = pathlib.Path(path).read_bytes()
-        try:
-            return cls.from_json(_decoded(content))
-        except ValueError as problem:
-            raise ValueError(f"{os.fspath(path)}: {problem}") from problem
-
-
 def json_lines(entries: Mapping[str, object]) -> str:
     """JSON text of a record, one entry a line; NaN and infinities are refused."""
     lines = [f'"{name}": {json.dumps(entry, allow_nan=False)}' for name, entry in entries.items()]
@@ -73,13 +46,6 @@ def json_entries(text: str) -> dict[str, Any]:
     if not isinstance(entries, dict):
         raise ValueError(f"not a record but a JSON {type(entries).__name__}")
     return entries
-
-
-def _decoded(content: bytes) -> str:
-    try:
-        return content.decode()
-    except UnicodeDecodeError:
-        raise ValueError("no text file") from None
 
 
 def write_whole(path: FilePath, write: Callable[[BinaryIO], object]) -> None:

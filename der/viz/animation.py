@@ -24,7 +24,7 @@ SEEN = 0.13  # the wider side of the section, over the ring's mean radius, to be
 
 
 @dataclass(frozen=True)
-class Drawn:
+class Section:
     """The section as it is drawn."""
 
     h: float  # along d1, a
@@ -43,7 +43,7 @@ class Playback:
     moment: Array  # (n,) GJ/a; nan in the middle of a fall
     energy: Array  # (n,) GJ/a
     density: Array  # (2, n, N) each of ENERGIES over length, at the vertices
-    section: Drawn
+    section: Section
     classes: tuple[str, ...]  # (m,) symmetry classes of the softest modes
     eigenvalues: Array  # (n, m); nan in the middle of a fall
     u: Array | None  # (n, N, 3) displacements in the softest mode; nan in the middle of a fall
@@ -196,13 +196,13 @@ def number(entries: Mapping[str, object], name: str, default: float) -> float:
     return float(value) if isinstance(value, int | float) else default
 
 
-def _section(path: Path, flat: Array) -> Drawn:
+def _section(path: Path, flat: Array) -> Section:
     """h and t of the section, and how many times larger they are drawn."""
     alpha, beta = (number(path.section, name, 1.0) for name in ("alpha", "beta"))
     t = 1.0 / number(path.numerics, "a_over_t", A_OVER_T)
     h = t * number(path.section, "h_over_t", math.sqrt(beta / alpha))
     factor = float(max(1, math.ceil(SEEN * _mean_radius(flat) / max(h, t))))
-    return Drawn(factor * h, factor * t, factor)
+    return Section(factor * h, factor * t, factor)
 
 
 def _mean_radius(flat: Array) -> float:

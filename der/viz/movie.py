@@ -31,8 +31,10 @@ from der.utils.files import FilePath, write_whole
 from der.viz.animation import Playback, grips
 from der.viz.captions import captions, names
 from der.viz.curve import SNAP, stretches
-from der.viz.plots.style import DASHES, INK, QUIET, STABLE, UNSTABLE
-from der.viz.projection import HALF_WIDTH, flat, seen
+from der.viz.palette import DASHES, INK, QUIET, STABLE, UNSTABLE
+from der.viz.ribbon import HALF_WIDTH
+from der.viz.ribbon import projected as flat
+from der.viz.ribbon import quadrilaterals as seen
 from der.viz.tween import in_step
 
 FORMATS = (".gif", ".mp4")

@@ -411,9 +411,7 @@ def test_an_unfinished_search_is_saved(capsys, tmp_path, monkeypatch, status, co
     """Where no file was named as well, and where is said in one line."""
     monkeypatch.chdir(tmp_path)
     unfinished = sample(status=status, message="why")
-    monkeypatch.setattr(
-        "der.analysis.multistability.states.states", lambda *scene, **options: unfinished
-    )
+    monkeypatch.setattr("der.states", lambda *scene, **options: unfinished)
     got, out, err = command(capsys, "--quiet")
     assert (got, out) == (code, "")
     assert err == "der: why; states that were found: 3, in der-unfinished.json\n"

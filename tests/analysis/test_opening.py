@@ -437,8 +437,8 @@ def test_picture_shows_what_is_extrapolated_and_how_many_there_are():
     assert "work 0.02109 ± 0.00052 GJ/a\nextrapolated" in captions[0]
     legend = [t.get_text() for t in figure.legends[0].get_texts()]
     opening = sum(one.kind == "force" and one.opens for one in found.pushes)
-    (said,) = [t for t in legend if t.startswith("slow force")]
-    assert f"{opening} that open it" in said
+    (said,) = [t for t in legend if t.startswith("quasi-static force")]
+    assert f"{opening} that open the ring" in said
     shown = {found.pushes[k].held.event for k in found.least.values()}
     shown |= {found.pushes[k].dead.event for k in found.least_dead.values()}
     assert len([t for t in legend if t in EVENTS.values()]) == len(shown)

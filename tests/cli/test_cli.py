@@ -21,6 +21,7 @@ from der.cli.commands import main
 from der.records.configurations import Shapes
 from der.records.path import Path
 
+CLONE = File(__file__).parents[2]
 EIGHTH = math.pi / 8
 SMALL = ("fold", "circle", "--h-over-t", "4", "--edges", "16")
 SNAPS = ("fold", "circle", "--h-over-t", "1.6", "--edges", "32")  # two folds in gamma
@@ -217,15 +218,11 @@ WRONG = [
     (("phase", "ellipse", "--out", "d", "--check", "rod"), "--check", "'rod'", "'der'"),
     (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
     (("phase", "ellipse", "--out", "d", "--range", "x=1:2"), "--range", "'x'", "h_over_t"),
-    (("stress", "--quick", "--long"), "--quick", "both", "together"),
-    (("stress", "--seed", "-1"), "--seed", "-1", "a whole number >= 0"),
     (("figure", "fig99", "--out", "."), "--name", "'fig99'", "fig2b"),
     (line("--egdes", "16"), "--egdes", "No such option", "--edges"),
     (("fold", "circle", "--h-over-t"), "--h-over-t", "requires", "argument"),
     (("bend",), "'bend'", "No such command", ""),
     (("flod",), "'flod'", "No such command", "'fold'"),
-    (("bench", "--json", "no/such/f.json"), "--json", "'no/such/f.json'", "folder"),
-    (("bench", "--only", "speed"), "--only", "'speed'", "paths, needs"),
 ]
 
 
@@ -241,6 +238,70 @@ def test_bad_input_is_refused_in_one_line(run, folder, words, option, value, all
     assert value in err[0]
     assert allowed in err[0]
     assert not list(folder.iterdir())
+
+
+EVIDENCE = [
+    (("stress", "--quick", "--long"), "--quick", "both", "together"),
+    (("stress", "--seed", "-1"), "--seed", "-1", "a whole number >= 0"),
+    (("bench", "--json", "no/such/f.json"), "--json", "'no/such/f.json'", "folder"),
+    (("bench", "--only", "speed"), "--only", "'speed'", "paths, needs"),
+]
+
+
+@pytest.mark.parametrize(("words", "option", "value", "allowed"), EVIDENCE)
+def test_bad_input_of_the_evidence_is_refused_in_one_line(
+    run, capsys, monkeypatch, words, option, value, allowed
+):
+    """In the folder of a clone, where `python -m validation` refuses it with the same words."""
+    from der.cli.commands import leave
+    from validation.__main__ import app
+
+    monkeypatch.chdir(CLONE)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    code, out, err = run(*words)
+    assert (code, out, len(err)) == (2, "", 1)
+    assert err[0].startswith("der: ")
+    assert option in err[0]
+    assert value in err[0]
+    assert allowed in err[0]
+    with pytest.raises(SystemExit) as left:
+        leave(app, "der", [words[0].replace("bench", "benchmark"), *words[1:]])
+    assert (left.value.code, capsys.readouterr().err.splitlines()) == (2, err)
+
+
+@pytest.mark.parametrize("name", ["bench", "stress"])
+def test_the_evidence_is_in_a_clone_only(run, name):
+    """Elsewhere one line says how to get it; the options are shown all the same."""
+    code, out, err = run(name, "--quick")
+    assert (code, out) == (2, "")
+    assert err == [
+        f"der: '{name}' runs in a clone of the repository of der only: "
+        "clone it, change into its folder, and repeat the command"
+    ]
+    assert "--quick" in run(name, "--help")[1]
+
+
+def test_evidence_is_run_as_a_module():
+    """`python -m validation` names its parts, and says its own name in errors."""
+    command = [sys.executable, "-m", "validation"]
+    options = {"capture_output": True, "text": True, "check": False, "cwd": CLONE}
+    done = subprocess.run(command, **options)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "benchmark" in done.stdout
+    done = subprocess.run([*command, "stress", "--seed", "x"], **options)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("python -m validation: ")
+
+
+@pytest.mark.parametrize("command", ["fold", "bvp"])
+def test_names_of_a_users_own_modules_are_free(command):
+    """`python -m der` imports no module of the folder in which it is called."""
+    for name in ("validation", "scenarios", "tests", "reference"):
+        File(f"{name}.py").write_text("raise SystemExit('not der')")
+    words = (command, "circle", "--h-over-t", "4", "--edges", "16", "--gamma-max", "0.1")
+    done = shell(*words, "--plot", "p.png", env=os.environ | {"PYTHONPATH": str(CLONE)})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert File("p.png").exists()
 
 
 def test_a_folder_below_a_file_is_refused(run):
@@ -681,7 +742,7 @@ def test_on_a_full_disk_an_unfinished_record_is_not_said_to_be_in_its_file(run, 
 
 def test_a_plot_that_cannot_be_written_does_not_cost_the_record(run, monkeypatch):
     """The record comes first; what failed is named, and the code is not 0."""
-    monkeypatch.setattr("der.viz.plots.path.save_plot", full)
+    monkeypatch.setattr("der.viz.plots.style.save_figure", full)
     code, _, err = run(*SMALL, "--gamma-max", "0.5", "--json", "f.json", "--plot", "p.png")
     assert code == 3
     assert err == ["der: could not write p.png: [Errno 28] No space left on device"]

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from concurrent.futures import Future
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 
 import numpy as np
@@ -13,22 +14,25 @@ import pytest
 
 import der
 from der.analysis.curve_distance import read_reference
-from validation.benchmark import cold as bench_cold
-from validation.benchmark import elastica as bench_elastica
-from validation.benchmark import methods as bench_methods
-from validation.benchmark import needs as bench_needs
-from validation.benchmark import orders as bench_orders
-from validation.benchmark import paths as bench_paths
-from validation.benchmark import rings as bench_rings
-from validation.benchmark import run as bench
-from validation.benchmark import sweep as bench_sweep
-from validation.benchmark.plot import front
-from validation.benchmark.rows import Row, Trial, measured, peak_memory
+from validation.benchmark import (
+    elastica,
+    methods,
+    needs,
+    orders,
+    paths,
+    rings,
+    run,
+    start,
+    state,
+    sweep,
+)
+from validation.benchmark.extent import Extent
+from validation.benchmark.rows import Measured, Row, Trial, front, measured, peak_memory
 from validation.benchmark.stepping import stepped
 from validation.stress.random_rings import random_rings
 
-CIRCLE, RECTANGLE = bench_rings.RINGS[0], bench_rings.RINGS[4]
-TINY = bench.Extent(
+CIRCLE, RECTANGLE = rings.RINGS[0], rings.RINGS[4]
+TINY = Extent(
     repeats=1,
     rings=(CIRCLE,),
     states=48,
@@ -49,9 +53,9 @@ TINY = bench.Extent(
 
 def test_run_writes_what_it_prints(tmp_path, capsys, monkeypatch):
     """Strict JSON: the machine, all rows, trials and scales that were printed; two pictures."""
-    monkeypatch.setattr(bench, "QUICK", TINY)
+    monkeypatch.setattr(run, "QUICK", TINY)
     parts = ("orders", "error", "state", "scaling")
-    found = bench.run(tmp_path / "own.json", out=tmp_path, quick=True, only=parts)
+    found = run.run(tmp_path / "own.json", out=tmp_path, quick=True, only=parts)
     record = json.loads((tmp_path / "bench.json").read_text(), parse_constant=pytest.fail)
     assert (tmp_path / "own.json").read_text() == (tmp_path / "bench.json").read_text()
     printed = capsys.readouterr().out
@@ -61,7 +65,7 @@ def test_run_writes_what_it_prints(tmp_path, capsys, monkeypatch):
         assert str(one) in lines
     assert [row["value"] for row in record["rows"]] == [row.value for row in found.rows]
     assert all(math.isfinite(row.value) for row in found.rows)
-    assert {trial["method"] for trial in record["trials"]} >= {*bench.bench_state.METHODS}
+    assert {trial["method"] for trial in record["trials"]} >= {*state.METHODS}
     assert [scale["n"] for scale in record["scales"]] == [16, 32]
     for name in ("bench_error.png", "bench_cost.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
@@ -76,9 +80,9 @@ def test_run_keeps_what_it_has_at_ctrl_c(tmp_path, monkeypatch):
         yield Row("path", "first", 1.0, "ms")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(bench, "measure", interrupted)
+    monkeypatch.setattr(run, "measure", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        bench.run(tmp_path / "bench.json")
+        run.run(tmp_path / "bench.json")
     assert len(json.loads((tmp_path / "bench.json").read_text())["rows"]) == 1
 
 
@@ -86,7 +90,7 @@ def test_run_keeps_what_it_has_at_ctrl_c(tmp_path, monkeypatch):
 def test_run_refuses_parts_that_there_are_not(only):
     """By name, before anything is measured."""
     with pytest.raises(ValueError, match="only must be some of paths, needs, orders"):
-        bench.run(only=only)
+        run.run(only=only)
 
 
 def test_a_peer_that_is_not_there_is_skipped_by_name(monkeypatch):
@@ -95,13 +99,11 @@ def test_a_peer_that_is_not_there_is_skipped_by_name(monkeypatch):
     def missing(_):
         raise PackageNotFoundError
 
-    monkeypatch.setattr(bench_elastica, "version", missing)
-    extent = bench.Extent(
-        repeats=1, edges=(), relaxed=(), tolerances=(1e-3,), stepping=(), elements=(8,)
-    )
-    found = bench.Found()
-    for one in bench._state(extent):
-        bench.kept(found, one)
+    monkeypatch.setattr(elastica, "version", missing)
+    extent = Extent(repeats=1, edges=(), relaxed=(), tolerances=(1e-3,), stepping=(), elements=(8,))
+    found = run.Found()
+    for one in state.rows(extent):
+        found.add(one)
     assert found.skipped == ["PyElastica: not installed, skipped"]
     assert [trial.method for trial in found.trials] == ["boundary value"]
 
@@ -111,8 +113,8 @@ def test_a_peer_that_is_there_agrees_to_its_order():
     pytest.importorskip("elastica")
     section, gamma = der.rectangular_section(4.0), 0.2
     scene = CIRCLE.scene(gamma_max=gamma, save_at=(gamma,))
-    exact = float(bench_paths.solve(scene).moment[-1])
-    coarse, fine = (bench_elastica.moment(section, n, gamma) - exact for n in (8, 16))
+    exact = float(der.solve_bvp(scene).moment[-1])
+    coarse, fine = (elastica.moment(section, n, gamma) - exact for n in (8, 16))
     assert math.log2(coarse / fine) == pytest.approx(2.0, abs=0.3)
 
 
@@ -151,7 +153,7 @@ def test_front_holds_what_none_beats():
 
 def test_start_up_measures_whole_commands():
     """One row each for help and for a fold, in seconds of wall time."""
-    rows = list(bench_paths.start_up(1))
+    rows = list(start.compiled(1))
     assert [row.case for row in rows] == ["der --help", "der fold circle --h-over-t 4 --quiet"]
     assert all(row.value > 0.0 for row in rows)
 
@@ -160,7 +162,7 @@ def test_start_up_is_not_measured_of_a_command_that_fails(monkeypatch):
     """A command that ends with an error is no measurement."""
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(subprocess.CalledProcessError):
-        list(bench_paths.start_up(1))
+        list(start.compiled(1))
 
 
 def test_compiling_is_charged_to_the_kernel_itself():
@@ -175,13 +177,13 @@ def test_compiling_is_charged_to_the_kernel_itself():
         ("other", 6.0, False),
         ("outer", 8.0, False),
     ]
-    found = bench_cold.own_times(bench_cold.Told(*one) for one in told)
+    found = start.own_times(start.Report(*one) for one in told)
     assert found == [("inner", 2, 4.0), ("outer", 1, 3.0), ("other", 1, 1.0)]
 
 
 def test_cold_start_has_rows():
     """A command in a process of its own, which tells of its kernels: here one without any."""
-    rows = list(bench_cold.rows(("--help",)))
+    rows = list(start.compiling(("--help",)))
     assert {row.group for row in rows} == {"start-up"}
     assert [row.value for row in rows[2:]] == [0.0, 0.0]
     assert all(row.value > 0.0 for row in rows[:2])
@@ -191,21 +193,23 @@ def test_needs_have_a_row_each(monkeypatch):
     """In times of the path without; here every need is done once, and costs what is put in."""
     done = []
 
-    def cost(work, _):
-        done.append(work())
-        return float(len(done)), 1000 * len(done)
+    def cost(work, _, *, memory=True):
+        result = work()
+        if memory:
+            done.append(result)
+        return Measured(result, float(len(done)), 0.0, 1000 * len(done))
 
-    monkeypatch.setattr(bench_needs, "_cost", cost)
-    rows = {row.case: row for row in bench_needs.rows(1, 32)}
-    assert set(bench_needs.NEEDS) <= set(rows)
+    monkeypatch.setattr(needs, "measured", cost)
+    rows = {row.case: row for row in needs.rows(1, 32)}
+    assert set(needs.NEEDS) <= set(rows)
     assert rows["stability of every state"].value == pytest.approx(2.0)
     assert rows["stability of every state"].note == "+1000.0 ms, +1 kB"
-    assert len(done) == len(bench_needs.NEEDS) + 7  # four paths without, three outputs
+    assert len(done) == len(needs.NEEDS) + 6  # three paths without that are no need, three outputs
 
 
 def test_relaxation_and_snaps_have_rows():
     """States by relaxation and by Newton; a snap on a quarter and on the full ring."""
-    rows = [*bench_paths.relaxation((16,), 1), *bench_paths.snaps(1)]
+    rows = [*paths.relaxation((16,), 1), *paths.snaps(1)]
     assert [row.group for row in rows] == ["relaxation", "relaxation", "snap", "snap"]
     assert all(row.value > 0.0 for row in rows)
 
@@ -215,9 +219,9 @@ def test_relaxation_and_snaps_have_rows():
 
 def test_reference_tables_are_there():
     """Every ring of the bench that names a table has one, with as many folds as it says."""
-    for case in bench_rings.RINGS:
+    for case in rings.RINGS:
         if case.table:
-            table = read_reference(bench_rings.TABLES / f"{case.table}.csv")
+            table = read_reference(rings.TABLES / f"{case.table}.csv")
             assert len(table.folds) == case.folds
 
 
@@ -229,9 +233,9 @@ def test_error_series_is_even(case, sizes):
 
     Fitted to three meshes; the next term of the series leaves 0.2 of the order of the last.
     """
-    truth = bench_rings.known(case, 160)
-    found = {row.case: row.value for row in bench_orders.rows(truth, sizes) if row.group == "order"}
-    for name, order in zip(bench_orders.NAMES, bench_orders.ORDERS, strict=True):
+    truth = rings.known(case, 160)
+    found = {row.case: row.value for row in orders.rows(truth, sizes) if row.group == "order"}
+    for name, order in zip(orders.NAMES, orders.ORDERS, strict=True):
         assert found[f"{case.name}, {name}"] == pytest.approx(order, abs=0.03 * order + 0.05)
 
 
@@ -239,14 +243,14 @@ def test_orders_are_fitted_above_the_floor():
     """A power law is found to rounding; what lies at the floor of the reference is left out."""
     sizes = np.array([8.0, 16.0, 32.0, 64.0, 128.0])
     values = np.maximum(sizes**-4.0, 1e-6)
-    assert bench_orders.fitted(sizes, values, 2e-6) == pytest.approx((4.0, 8.0, 16.0))
-    assert bench_orders.fitted(sizes, values, 1e-4) is None
+    assert orders.fitted(sizes, values, 2e-6) == pytest.approx((4.0, 8.0, 16.0))
+    assert orders.fitted(sizes, values, 1e-4) is None
 
 
 def test_stepping_follows_the_path():
     """solve_bvp to its tolerance of 1e-4 at gamma = 0.4; M and U within ten times that."""
     scene = CIRCLE.scene(gamma_max=0.4, save_at=(0.4,))
-    ours, theirs = bench_paths.solve(scene), stepped(scene, 1e-4)
+    ours, theirs = der.solve_bvp(scene), stepped(scene, 1e-4)
     assert theirs.moment[-1] == pytest.approx(ours.moment[-1], rel=1e-3)
     assert theirs.energy[-1] == pytest.approx(ours.energy[-1], rel=1e-3)
 
@@ -257,9 +261,9 @@ def test_a_trial_that_fails_says_why(monkeypatch):
     def stuck(*_):
         raise ValueError("gamma cannot be stepped beyond 1.0")
 
-    monkeypatch.setattr(bench_methods, "stepped", stuck)
-    truth = bench_rings.known(CIRCLE, 48)
-    trials = list(bench_methods.stepping_trials(truth, (1e-3, 1e-4), 1))
+    monkeypatch.setattr(methods, "stepped", stuck)
+    extent = replace(TINY, edges=(), relaxed=(), tolerances=(), stepping=(1e-3, 1e-4))
+    trials = [one for one in methods.rows(extent) if isinstance(one, Trial)]
     assert [one.note for one in trials] == ["gamma cannot be stepped beyond 1.0"] * 2
     assert front(trials) == []
 
@@ -267,7 +271,7 @@ def test_a_trial_that_fails_says_why(monkeypatch):
 def test_stepping_refuses_a_ring_without_quarter():
     """By name."""
     with pytest.raises(ValueError, match="ring must have a quarter to be stepped here"):
-        stepped(bench_rings.RINGS[5].scene(), 1e-3)
+        stepped(rings.RINGS[5].scene(), 1e-3)
 
 
 # --- The sweep -------------------------------------------------------------------------------
@@ -295,17 +299,17 @@ def test_sweep_counts_rings_and_holds_its_bars(monkeypatch):
     def here(_):
         yield Here()
 
-    monkeypatch.setattr(bench_sweep, "workers", here)
-    rows = {row.case: row.value for row in bench_sweep.rows(2, 1)}
-    for method in bench_sweep.METHODS:
+    monkeypatch.setattr(sweep, "workers", here)
+    rows = {row.case: row.value for row in sweep.rows(2, 1)}
+    for method in sweep.METHODS:
         assert rows[f"{method}, rings with M to 0.0001"] == 2
-    assert rows["rod, error of M in truth, 1 rings, largest"] <= bench_sweep.ASKED
+    assert rows["rod, error of M in truth, 1 rings, largest"] <= sweep.ASKED
 
 
 def test_sweep_takes_more_edges_for_less_error():
     """A bar ten times under that of the first mesh is not met there."""
     ring, section = next(random_rings(1, 0))
-    plain = bench_sweep.swept(ring, section)
-    finer = bench_sweep.swept(ring, section, 0.1 * plain.bar)
+    plain = sweep.swept(ring, section)
+    finer = sweep.swept(ring, section, 0.1 * plain.bar)
     assert finer.n > plain.n
     assert finer.bar <= 0.1 * plain.bar

@@ -11,9 +11,11 @@ from numpy.testing import assert_allclose
 
 from der.records.configurations import Shapes
 from der.records.path import AtPi, Mode, Path, Point, Timing, counts
-from der.viz.plots.path import STRETCHES, figure_of_path, save_plot
+from der.viz.palette import STRETCHES
+from der.viz.plots.path import draw
+from der.viz.plots.style import save
 
-STABLE, UNSTABLE, UNKNOWN = (STRETCHES[key][0] for key in (True, False, None))
+STABLE, UNSTABLE, UNKNOWN = (STRETCHES[key].label for key in (True, False, None))
 
 
 def special(kind, position, gamma, moment):
@@ -62,12 +64,12 @@ def legend(figure):
 
 def lines(panel, stability):
     """Curves in the colour of stable or unstable stretches."""
-    _, colour, _ = STRETCHES[stability]
+    colour = STRETCHES[stability].colour
     return [line for line in panel.lines if to_hex(line.get_color()) == colour.lower()]
 
 
 def test_moment_and_energy_share_gamma():
-    above, below = figure_of_path(path()).axes
+    above, below = draw(path()).axes
     assert above.get_shared_x_axes().joined(above, below)
     assert ("moment" in above.get_ylabel(), "energy" in below.get_ylabel()) == (True, True)
 
@@ -76,7 +78,7 @@ def test_moment_and_energy_share_gamma():
 def test_style_changes_at_the_folds(panel):
     """Solid, dashed, solid: a state of unknown index ends one stretch and begins the next."""
     subject = path()
-    axes = figure_of_path(subject).axes[panel]
+    axes = draw(subject).axes[panel]
     solid, dashed = lines(axes, True), lines(axes, False)
     assert [line.is_dashed() for line in (*solid, *dashed)] == [False, False, True]
     ends = dashed[0].get_xdata()[[0, -1]]
@@ -86,7 +88,7 @@ def test_style_changes_at_the_folds(panel):
 def test_curve_goes_through_every_state_and_near_the_true_path():
     """M = 1.5 + s gives gamma exactly; chords between these few states are off by 3%."""
     subject = path()
-    drawn = [line.get_xydata() for line in figure_of_path(subject).axes[0].lines]
+    drawn = [line.get_xydata() for line in draw(subject).axes[0].lines]
     curve = np.concatenate([points for points in drawn if len(points) > 20])
     states = np.column_stack([subject.gamma / np.pi, subject.moment])
     nearest = np.linalg.norm(states[:, None] - curve, axis=2).min(axis=1)
@@ -98,14 +100,14 @@ def test_curve_goes_through_every_state_and_near_the_true_path():
 
 def test_special_points_are_marked_where_they_are():
     subject = path()
-    above = figure_of_path(subject).axes[0]
+    above = draw(subject).axes[0]
     (folds,) = [line for line in above.lines if line.get_marker() == "D" and len(line.get_xdata())]
     assert_allclose(folds.get_xdata(), subject.gamma[[3, 7]] / np.pi)
     assert_allclose(folds.get_ydata(), subject.moment[[3, 7]])
 
 
 def test_legend_lists_only_what_occurs():
-    assert legend(figure_of_path(path())) == [STABLE, UNSTABLE, "fold", "computed state"]
+    assert legend(draw(path())) == [STABLE, UNSTABLE, "fold", "computed state"]
 
 
 @pytest.mark.parametrize(
@@ -118,15 +120,15 @@ def test_legend_lists_only_what_occurs():
 )
 def test_every_kind_of_point_has_its_entry(kind, label):
     subject = path(points=(special(kind, 5, 1.5, 1.5),))
-    assert legend(figure_of_path(subject)) == [STABLE, UNSTABLE, label, "computed state"]
+    assert legend(draw(subject)) == [STABLE, UNSTABLE, label, "computed state"]
 
 
 def test_snap_is_a_line_of_its_own():
     """No equilibria join the states before and after it: a straight dotted line does."""
     subject = path(points=(special("snap", 5, 1.5, 1.5),))
-    figure = figure_of_path(subject)
-    assert "the ring snaps" in legend(figure)
-    assert "landing" in legend(figure)
+    figure = draw(subject)
+    assert "snap" in legend(figure)
+    assert "end of a snap" in legend(figure)
     ends = np.column_stack([subject.gamma, subject.moment])[4:6] / (np.pi, 1.0)
     curves = [line.get_xydata() for line in figure.axes[0].lines]
     (jump,) = [c for c in curves if len(c) > 2 and np.allclose(c[[0, -1]], ends)]
@@ -140,7 +142,7 @@ def test_a_snap_under_a_dead_moment_is_level_and_ends_at_the_ring_s_own():
         points=(special("snap", 5, 1.5, 1.5),), numerics={"n_edges": 32, "control": "moment"}
     )
     ends = np.column_stack([subject.gamma, subject.moment])[4:6] / (np.pi, 1.0)
-    curves = [line.get_xydata() for line in figure_of_path(subject).axes[0].lines]
+    curves = [line.get_xydata() for line in draw(subject).axes[0].lines]
     (jump,) = [c for c in curves if len(c) > 2 and np.allclose(c[[0, -1]], ends)]
     assert_allclose(jump[:-1, 1], ends[0, 1], atol=1e-12)
     assert jump[-2, 0] == pytest.approx(ends[1, 0])
@@ -150,7 +152,7 @@ def test_title_of_a_path_that_comes_back_says_so():
     """Gamma goes up and ends at 0 again."""
     gamma = np.append(np.linspace(0.0, np.pi, 6), np.linspace(np.pi, 0.0, 6)[1:])
     subject = path(gamma=gamma, mode=None, at_pi=None, points=())
-    assert figure_of_path(subject).texts[0].get_text().endswith("= π and back")
+    assert draw(subject).texts[0].get_text().endswith("= π and back")
 
 
 def test_states_that_would_hide_their_line_are_left_out():
@@ -159,36 +161,36 @@ def test_states_that_would_hide_their_line_are_left_out():
     unknown = counts([None] * 300)
     many = {"gamma": gamma, "moment": np.sin(gamma), "energy": gamma**2}
     subject = path(**many, index=unknown, index_moment=unknown, points=())
-    assert "computed state" not in legend(figure_of_path(subject))
-    assert "computed state" in legend(figure_of_path(path()))
+    assert "computed state" not in legend(draw(subject))
+    assert "computed state" in legend(draw(path()))
 
 
 def test_path_without_index_says_that_stability_was_not_computed():
-    figure = figure_of_path(path(index=counts([None] * 11)))
+    figure = draw(path(index=counts([None] * 11)))
     assert legend(figure)[0] == UNKNOWN
     assert not any(line.is_dashed() for line in figure.axes[0].lines)
 
 
 def test_title_names_ring_section_edges_and_mode():
-    title = figure_of_path(path()).texts[0].get_text()
+    title = draw(path()).texts[0].get_text()
     for part in ("ellipse, b/a = 0.85, about y", "h/t = 1.6", "0.3", "32 edges"):
         assert part in title
-    assert title.endswith("folds, stable, snap-back")
+    assert title.endswith("foldable, stable at fixed M, snap-back")
 
 
 def test_title_of_an_incomplete_path_says_so():
     subject = path(mode=None, at_pi=None, status="interrupted")
-    assert figure_of_path(subject).texts[0].get_text().endswith("interrupted")
+    assert draw(subject).texts[0].get_text().endswith("interrupted")
 
 
 def test_section_without_shape_is_named_by_its_ratios():
     subject = path(section={"h_over_t": None, "nu": None, "alpha": 0.9, "beta": 2.5})
-    assert r"$\alpha$ = 0.9, $\beta$ = 2.5" in figure_of_path(subject).texts[0].get_text()
+    assert "α = 0.9, β = 2.5" in draw(subject).texts[0].get_text()
 
 
 def test_snapshots_hold_the_ends_and_the_peak_and_are_lettered_on_both_curves():
     subject = path(shapes=shapes(), moment=np.sin(np.linspace(0.0, np.pi, 11)) + 0.1)
-    above, below, row = figure_of_path(subject).axes
+    above, below, row = draw(subject).axes
     said = [text.get_text().split("$   ")[1] for text in row.texts]
     named = [f"{gamma / np.pi:.3g} π" for gamma in subject.gamma]
     assert [said[0], said[-1]] == [rf"$\gamma$ = {named[k]}" for k in (0, -1)]
@@ -203,7 +205,7 @@ def test_ribbons_are_in_one_scale():
     flat = shapes(1)
     size = np.linspace(1.0, 0.5, 11)[:, None, None]
     shrinking = Shapes(flat.x * size, np.repeat(flat.frames, 11, axis=0))
-    row = figure_of_path(path(shapes=shrinking)).axes[2]
+    row = draw(path(shapes=shrinking)).axes[2]
     first, last = (
         np.ptp(np.concatenate([p.vertices for p in drawn.get_paths()])[:, 1])
         for drawn in (row.collections[0], row.collections[-1])
@@ -218,7 +220,7 @@ def test_path_of_one_state_is_a_point():
         points=(),
         shapes=shapes(1),
     )
-    figure = figure_of_path(one)
+    figure = draw(one)
     assert [text.get_text() for text in figure.axes[0].texts] == ["A"]
 
 
@@ -226,7 +228,7 @@ def test_path_without_states_is_refused():
     empty = {name: np.array([]) for name in ("gamma", "moment", "energy")}
     subject = path(**empty, index=counts([]), index_moment=counts([]), points=())
     with pytest.raises(ValueError, match="at least one state"):
-        figure_of_path(subject)
+        draw(subject)
 
 
 @pytest.mark.parametrize(
@@ -234,25 +236,25 @@ def test_path_without_states_is_refused():
 )
 def test_format_follows_the_suffix(tmp_path, suffix, begins):
     file = tmp_path / f"plot{suffix}"
-    save_plot(path(shapes=shapes()), file)
+    save(draw(path(shapes=shapes())), file)
     assert file.read_bytes().startswith(begins)
 
 
 @pytest.mark.parametrize("name", ["plot.gif", "plot", "png"])
 def test_unknown_suffix_is_named(tmp_path, name):
     with pytest.raises(ValueError, match=rf"must end in .png, .pdf, .svg, got '.*{name}'"):
-        save_plot(path(), tmp_path / name)
+        save(draw(path()), tmp_path / name)
 
 
 def test_absent_folder_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"nowhere/plot\.png' cannot be written"):
-        save_plot(path(), tmp_path / "nowhere" / "plot.png")
+        save(draw(path()), tmp_path / "nowhere" / "plot.png")
 
 
 def test_folder_in_place_of_the_file_is_named_and_nothing_is_left(tmp_path):
     (tmp_path / "plot.png").mkdir()
     with pytest.raises(ValueError, match=r"plot\.png' cannot be written"):
-        save_plot(path(), tmp_path / "plot.png")
+        save(draw(path()), tmp_path / "plot.png")
     assert [file.name for file in tmp_path.iterdir()] == ["plot.png"]
 
 
@@ -266,5 +268,5 @@ def test_drawing_needs_neither_display_nor_pyplot():
 def test_path_is_the_same_after_drawing():
     subject = path(shapes=shapes())
     before = replace(subject).to_json()
-    figure_of_path(subject)
+    draw(subject)
     assert subject.to_json() == before

@@ -17,38 +17,38 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path as File
 
-from der.diagram.cases import Case, Row, solve_case
+from der.diagram.cases import Case, solve_case
+from der.diagram.cases import Row as Solved
 from der.diagram.families import family
 from der.diagram.scan import Solve, solve_all
 from der.diagram.store import Store
 from der.diagram.workers import Workers, workers
 from validation.arguments import Arguments
+from validation.benchmark.rows import Row
 
 DIAGRAM = "fig3a"
 SIDE = 12  # cases along each side of the diagram, for the gain
 TRIVIAL = 400  # cases, for the cost of sending one
 
-BenchRow = tuple[str, str, float, str, float | None, str]
 
-
-def rows(repeats: int) -> Iterator[BenchRow]:
-    """Group, case, value, unit, goal and note of each row."""
+def rows(repeats: int) -> Iterator[Row]:
+    """The gain of a second worker, and the cost of a case."""
     yield _gain(repeats)
     with workers(2) as crew:
         yield _cost("2 processes", crew, repeats)
     yield from _dask(repeats)
 
 
-def timed(case: Case) -> Row:
+def timed(case: Case) -> Solved:
     """`solve_case`, with the CPU time that it took."""
     started = time.process_time()
     row = solve_case(case)
     return replace(row, seconds=time.process_time() - started)
 
 
-def nothing(case: Case) -> Row:
+def nothing(case: Case) -> Solved:
     """A row without any work."""
-    return Row(case, "unfoldable")
+    return Solved(case, "unfoldable")
 
 
 def _cases(side: int) -> list[Case]:
@@ -57,7 +57,7 @@ def _cases(side: int) -> list[Case]:
     return [of.case("x", (u, v)) for u in parts for v in parts]
 
 
-def _gain(repeats: int) -> BenchRow:
+def _gain(repeats: int) -> Row:
     """Wall time of one worker over that of two, on the same cases by turns."""
     cases = _cases(SIDE)
     one, two = [], []
@@ -77,10 +77,11 @@ def _gain(repeats: int) -> BenchRow:
         f"two, whose cores were at cases {cpu / wall / 2:.0%} of the time; {cores} cores, "
         f"{os.getloadavg()[0]:.1f} processes ran on them"
     )
-    return "phase", f"2 workers vs 1, {len(cases)} cases of {DIAGRAM}", ratio, "times", 1.8, note
+    case = f"2 workers vs 1, {len(cases)} cases of {DIAGRAM}"
+    return Row("phase", case, ratio, "times", 1.8, note)
 
 
-def _cost(words: str, crew: Workers, repeats: int) -> BenchRow:
+def _cost(words: str, crew: Workers, repeats: int) -> Row:
     """Wall time of a case without work: sent, brought back, stored and synced."""
     of = family(DIAGRAM)
     cases = [of.case("x", (k / TRIVIAL, 0.0)) for k in range(TRIVIAL)]
@@ -89,10 +90,10 @@ def _cost(words: str, crew: Workers, repeats: int) -> BenchRow:
     taken = statistics.median(_wall(cases, crew, nothing)[0] for _ in range(repeats))
     here = (time.process_time() - before) / repeats
     note = f"{1e3 * here / TRIVIAL:.2f} ms of CPU in the main process"
-    return "phase", f"overhead of a case, {words}", 1e3 * taken / TRIVIAL, "ms", 5.0, note
+    return Row("phase", f"overhead of a case, {words}", 1e3 * taken / TRIVIAL, "ms", 5.0, note)
 
 
-def _dask(repeats: int) -> Iterator[BenchRow]:
+def _dask(repeats: int) -> Iterator[Row]:
     """The same by a Dask scheduler with two workers of its own, where Dask is installed."""
     try:
         from distributed import LocalCluster
@@ -118,8 +119,8 @@ def _wall(cases: Sequence[Case], crew: Workers, solve: Solve) -> tuple[float, fl
 def main() -> None:
     """Print the rows."""
     Arguments(__file__, __doc__).parse_args()
-    for group, case, value, unit, goal, note in rows(5):
-        print(f"{group:7}{case:40}{value:8.3g} {unit:6} goal {goal:<5g} {note}", flush=True)
+    for row in rows(5):
+        print(row, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,37 +1,40 @@
-"""The rings on which `der bench` compares methods, and what is known of their paths.
+"""The rings on which the benchmark compares methods, and what is known of their paths.
 
 The truth is the boundary-value problem's path at a tolerance of 1e-11, at many more states than any
-method visits, and a curve through them (`curves`); where AUTO-07p has computed the same ring, how
-far its states lie from that curve is a row of the bench.
+method finds, and a curve through them. Where AUTO-07p has computed the same ring, a row of the
+benchmark says how far its states lie from that curve.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import der
 from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error, read_reference
 from der.bvp.solve import FINEST, solve_visits
-from der.geometry.ring import Ring
-from validation.benchmark.rows import Row
+from validation.benchmark.rows import Row, counts, finite
 
 TABLES = Path(__file__).parents[1] / "reference"
-STATES = 400  # over 0 to pi, besides those of the path; 256 are enough for 1e-9
 SHIFTED = 61  # states at other places, by which the curve through the former is judged
 NEAR = 1e-3  # of the scaled state: closer ones would make the curve's parameter uneven
+BARE: Mapping[str, object] = {
+    "stability": False,
+    "self_crossings": False,
+}  # the least one can ask for
 
 
 class BenchRing(NamedTuple):
     """A ring, and the table that AUTO-07p has left of it."""
 
     name: str
-    ring: Ring
+    ring: der.Ring
     h_over_t: float = 4.0
     table: str = ""
     folds: int = 0
@@ -44,7 +47,7 @@ class BenchRing(NamedTuple):
 RINGS = (
     BenchRing("circle, h/t 4", der.circle(), table="circ_ht4"),
     BenchRing("circle, h/t 1.6", der.circle(), 1.6, "circ_ht1.6", 2),
-    BenchRing("ellipse 0.85 about y", der.ellipse(0.85, "y"), table="ell_ba0.85_y_ht4", folds=2),
+    BenchRing("ellipse 0.85 about y", der.ellipse(0.85, "y"), 4.0, "ell_ba0.85_y_ht4", 2),
     BenchRing("rectangle 0.6, r/a 0.3", der.rectangle(0.6, 0.3), table="rect_ba0.6_ra0.3_x_ht4"),
     BenchRing("rectangle 0.6, r/a 0.05", der.rectangle(0.6, 0.05)),
     BenchRing(
@@ -56,6 +59,11 @@ RINGS = (
 )
 
 
+def circle(h_over_t: float, **wants: object) -> der.Scene:
+    """A circle, and what is wanted of its path."""
+    return BenchRing("circle", der.circle(), h_over_t).scene(**wants)
+
+
 @dataclass(frozen=True)
 class Known:
     """What is known of a ring's path."""
@@ -64,16 +72,22 @@ class Known:
     curve: ReferenceCurve
     floor: float  # distance, in the scaled planes, below which the curve says nothing
 
-    def errors(self, path: der.Path) -> tuple[float, float]:
-        """Largest normal distances of a path's states in M and U."""
-        return curve_error(path.gamma, path.moment, path.energy, self.curve)
+    def errors(self, found: Any) -> Mapping[str, Any]:
+        """Entries of a trial: normal distances in M and U, error of the folds' gamma, a note."""
+        off = curve_error(found.gamma, found.moment, found.energy, self.curve)
+        moment, energy = (max(error, self.floor) for error in off)
+        if not isinstance(found, der.Path):
+            return {"moment": moment, "energy": energy, "note": found.note}
+        folds, note = None, counts(found)
+        if self.curve.folds:
+            folds = finite(fold_error([point.gamma for point in found.folds], self.curve))
+            if folds is None:
+                note += f"; {len(found.folds)} of {len(self.curve.folds)} folds"
+        return {"moment": moment, "energy": energy, "folds": folds, "note": note}
 
-    def fold_error(self, path: der.Path) -> float:
-        """Largest error of a fold's gamma, rad; infinite where one is missing."""
-        return fold_error([point.gamma for point in path.folds], self.curve)
 
-
-def known(case: BenchRing, states: int = STATES) -> Known:
+@cache  # several parts of the benchmark ask for the same
+def known(case: BenchRing, states: int) -> Known:
     """Solve for the path at many states, and judge the curve through them by others."""
     curve = _curve(case, states, 0.0)
     other = _curve(case, SHIFTED, 0.37)
@@ -102,11 +116,10 @@ def rows(truth: Known) -> Iterator[Row]:
     """How well the reference is known, by itself and by AUTO-07p."""
     name = truth.case.name
     note = f"{len(truth.curve.gamma)} states at {FINEST:g}; the curve through others, judged by 61"
-    yield Row("reference", name, truth.floor, "", None, note)
+    yield Row("reference", name, truth.floor, "", note=note)
     if truth.case.table:
         auto = read_reference(TABLES / f"{truth.case.table}.csv")
         off = max(curve_error(auto.gamma, auto.moment, auto.energy, truth.curve))
-        note = ""
-        if auto.folds:
-            note = f"folds {fold_error(truth.curve.folds, auto):.1e} rad apart"
-        yield Row("reference", f"{name}, states of AUTO-07p off it", off, "", None, note)
+        apart = f"{fold_error(truth.curve.folds, auto):.1e}" if auto.folds else ""
+        note = f"folds {apart} rad apart" if apart else ""
+        yield Row("reference", f"{name}, states of AUTO-07p off it", off, "", note=note)

@@ -1,4 +1,4 @@
-"""What `der bench` hands out: rows, trials, and how time and memory are taken."""
+"""What the benchmark measures: rows, trials, and how time and memory are taken."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import platform
 import statistics
 import time
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
+
+from der.errors import NotConverged
 
 Result = TypeVar("Result")
 
@@ -35,24 +37,23 @@ class Row:
 
 @dataclass(frozen=True)
 class Trial:
-    """What one method cost on one ring, and how far off it was; None: it has no such answer."""
+    """Cost and error of one method on one ring; None: not taken, or no such answer."""
 
     ring: str
     method: str
     setting: str  # number of edges, or tolerance
-    cpu: float  # s, median
-    wall: float  # s, median
-    memory: int | None  # B, largest held at once; None: not taken
-    moment: float | None  # error of M, as a fraction of the largest
-    energy: float | None  # error of U, likewise
-    folds: float | None  # largest error of a fold's gamma, rad
+    cpu: float = 0.0  # s, median
+    wall: float = 0.0  # s, median
+    memory: int | None = None  # B, largest held at once
+    moment: float | None = None  # error of M, as a fraction of the largest
+    energy: float | None = None  # error of U, likewise
+    folds: float | None = None  # largest error of a fold's gamma, rad
     note: str = ""
 
     @property
     def error(self) -> float | None:
         """The larger of the errors in M and U."""
-        known = [e for e in (self.moment, self.energy) if e is not None]
-        return max(known) if known else None
+        return max((e for e in (self.moment, self.energy) if e is not None), default=None)
 
     def __str__(self) -> str:
         memory = "" if self.memory is None else f"{1e-3 * self.memory:.0f} kB"
@@ -63,13 +64,23 @@ class Trial:
         ).rstrip()
 
 
-def failed(ring: str, method: str, setting: str, why: object) -> Trial:
-    """A trial that came to nothing, and why."""
-    return Trial(ring, method, setting, 0.0, 0.0, None, None, None, None, str(why))
-
-
 def _short(value: float | None) -> str:
     return f"{'-':8}" if value is None else f"{value:8.1e}"
+
+
+def front(trials: Iterable[Trial]) -> list[Trial]:
+    """The trials that none beats in both time and error, from fast to exact."""
+    best: list[Trial] = []
+    for trial in sorted((t for t in trials if t.error is not None), key=lambda t: (t.cpu, t.error)):
+        if not best or (trial.error or 0.0) < (best[-1].error or 0.0):
+            best.append(trial)
+    return best
+
+
+def front_text(name: str, trials: Iterable[Trial]) -> str:
+    """The same in a sentence."""
+    best = (f"{1e3 * t.cpu:.1f} ms {t.error:.1e} {t.method} {t.setting}" for t in front(trials))
+    return f"{name}: none is faster and better than {'; '.join(best)}"
 
 
 @dataclass(frozen=True)
@@ -119,6 +130,45 @@ def peak_memory(work: Callable[[], object]) -> int:
 def cpu_time(work: Callable[[], object], repeats: int) -> float:
     """Median CPU time of ``work`` [s], after one run that is not counted."""
     return measured(work, repeats, memory=False).cpu
+
+
+def path_row(
+    group: str, case: str, work: Callable[[], Any], repeats: int, goal: float | None = None
+) -> Row:
+    """CPU time of what returns a path [ms]; steps and iterations are in the note."""
+    done = measured(work, repeats, memory=False)
+    return Row(group, case, 1e3 * done.cpu, "ms", goal, counts(done.result))
+
+
+def counts(path: Any) -> str:
+    """Steps and iterations of a path, in words."""
+    return f"{path.timing.steps} steps, {path.timing.newton_iterations} Newton iterations"
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A method at one setting, to be timed.
+
+    Parameters
+    ----------
+    work : one run; what it raises, `NotConverged` or `ValueError`, is the trial's note.
+    memory : whether its memory is measured.
+    """
+
+    method: str
+    setting: str
+    work: Callable[[], Any]
+    repeats: int
+    memory: bool = True
+
+    def trial(self, ring: str, errors: Callable[[Any], Mapping[str, Any]]) -> Trial:
+        """Time it; ``errors`` are a trial's entries from moment to note, of the result."""
+        try:
+            done = measured(self.work, self.repeats, memory=self.memory, warm=False)
+        except (NotConverged, ValueError) as failure:  # refused, or given up: both say why
+            return Trial(ring, self.method, self.setting, note=str(failure))
+        cost = (done.cpu, done.wall, done.memory)
+        return Trial(ring, self.method, self.setting, *cost, **errors(done.result))
 
 
 def finite(value: float) -> float | None:

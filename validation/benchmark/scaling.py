@@ -13,10 +13,10 @@ from der.kernels.block_ldl import factor
 from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
 from der.rod.gripped_ring import Sector, sector
 from der.rod.rod import State
-from validation.benchmark.paths import circle
+from validation.benchmark.extent import Extent
+from validation.benchmark.rings import BARE, circle
 from validation.benchmark.rows import Row, cpu_time, measured
 
-SIZES = (16, 64, 256, 1024, 4096, 16384, 65536)
 AS_A_BATCH = 2048  # edges over which short solves are repeated, so that the clock can tell
 
 
@@ -35,7 +35,7 @@ class Scale:
     def __str__(self) -> str:
         return f"N {self.n}: {1e6 * self.newton / self.n:.2f} us an edge, path {self.path:.3g} s"
 
-    def rows(self) -> Iterator[Row]:
+    def table(self) -> Iterator[Row]:
         """The same as rows."""
         n = self.n
         goal = 0.15 if n == 64 else None
@@ -43,16 +43,24 @@ class Scale:
         yield Row("newton", f"full ring, N {n}", 1e3 * self.newton, "ms", goal, note)
         yield Row("memory", f"iteration, full ring, N {n}", self.held / n, "B/edge", 4096.0)
         note = f"{self.iterations} Newton iterations"
-        yield Row("path over N", f"quarter, N {n}", 1e3 * self.path, "ms", None, note)
+        yield Row("path over N", f"quarter, N {n}", 1e3 * self.path, "ms", note=note)
         kept = 4 * self.path_memory / n
         note = f"{1e-6 * self.path_memory:.2f} MB; an edge of the quarter"
-        yield Row("memory", f"path, quarter, N {n}", kept, "B/edge", None, note)
+        yield Row("memory", f"path, quarter, N {n}", kept, "B/edge", note=note)
+
+
+def rows(extent: Extent) -> Iterator[Scale | Row]:
+    """Each number of edges, and the same as rows."""
+    for n in extent.scales:
+        found = scale(n, min(extent.repeats, 5))
+        yield found
+        yield from found.table()
 
 
 def scale(n: int, repeats: int) -> Scale:
     """Measure N edges; paths above 4,096 edges are long enough to be timed once."""
     newton, residual, ring = _newton(n, repeats)
-    scene = circle(4.0, n_edges=n, stability=False, self_crossings=False)
+    scene = circle(4.0, n_edges=n, **BARE)
     path = measured(lambda: der.fold(scene), repeats if n <= 4096 else 1, warm=n <= 4096)
     iterations = path.result.timing.newton_iterations
     return Scale(n, newton, residual, _bytes(ring), path.cpu, path.memory or 0, iterations)

@@ -1,84 +1,56 @@
-"""One state of the circle, M at gamma = pi/2, by everyone who can turn a ring: error over time.
+"""One state of the circle, M at gamma = pi/2, by every code that can turn a ring: error over time.
 
-A path has no meaning for a code that steps a dynamic rod through time, so all are asked for the
-same single number, from the flat ring on, before anything has folded or snapped.
+A code that steps a dynamic rod through time has no path, so that all are asked for the same single
+number, from the flat ring on, before anything has folded or snapped.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from functools import partial
+from itertools import chain
+from typing import Any
 
 import der
-from der.bvp.solve import FINEST, solve_bvp
-from der.errors import NotConverged
-from validation.benchmark import elastica as bench_elastica
-from validation.benchmark.methods import BARE, RELAXED, STEPPING
-from validation.benchmark.rings import RINGS, BenchRing
-from validation.benchmark.rows import Trial, failed, measured
-from validation.benchmark.stepping import stepped
+from der.bvp.solve import FINEST
+from validation.benchmark import elastica
+from validation.benchmark.extent import Extent
+from validation.benchmark.methods import RELAXATION, ROD, attempts
+from validation.benchmark.rings import RINGS
+from validation.benchmark.rows import Attempt, Trial, front_text
 
 NAME = "circle, h/t 4, M at pi/2"
 GAMMA = 0.5 * math.pi
-CIRCLE: BenchRing = RINGS[0]
-METHODS: Mapping[str, Mapping[str, object]] = {
-    "rod, sector": {},
-    "rod, full ring": {"sector": "full"},
-    "rod, extrapolated": {"error_bars": True},
-    "dynamic relaxation": RELAXED,
+CIRCLE = RINGS[0]
+METHODS = {
+    name: ROD[name] for name in ("rod, sector", "rod, full ring", "rod, extrapolated", RELAXATION)
 }
 PEER = "PyElastica, closed ring"
 
 
-def trials(
-    sizes: Mapping[str, Sequence[int]],
-    tolerances: Sequence[float],
-    stepping: Sequence[float],
-    elements: Sequence[int],
-    repeats: int,
-) -> Iterator[Trial]:
-    """All methods; ``sizes`` by method, ``elements`` of PyElastica."""
-    only: dict[str, object] = {"gamma_max": GAMMA, "save_at": (GAMMA,)}
-    scene = CIRCLE.scene(**only)
-    exact = float(solve_bvp(scene, tolerance=FINEST).moment[-1])
+def rows(extent: Extent) -> Iterator[Trial | str]:
+    """Errors over time of all methods, and of PyElastica where it is installed."""
+    scene = partial(CIRCLE.scene, gamma_max=GAMMA, save_at=(GAMMA,))
+    exact = float(der.solve_bvp(scene(), tolerance=FINEST).moment[-1])
 
-    def trial(method: str, setting: str, work: Callable[[], float], times: int) -> Trial:
-        slow = times == 1
-        try:
-            done = measured(work, times, memory=not slow, warm=not slow)
-        except (NotConverged, ValueError) as failure:
-            return failed(NAME, method, setting, failure)
-        off = max(abs(done.result - exact) / abs(exact), FINEST)
-        return Trial(NAME, method, setting, done.cpu, done.wall, done.memory, off, None, None)
+    def errors(found: Any) -> Mapping[str, float]:
+        moment = found if isinstance(found, float) else float(found.moment[-1])
+        return {"moment": max(abs(moment / exact - 1.0), FINEST)}
 
-    for method, numbers in sizes.items():
-        for n in numbers:
-            rod = CIRCLE.scene(**{**BARE, **only, **METHODS[method]}, n_edges=n)
-            yield trial(method, f"N {n}", lambda rod=rod: _last(der.fold(rod)), repeats)  # type: ignore[misc]
-    for tolerance in tolerances:
-        yield trial(
-            "boundary value",
-            f"{tolerance:.0e}",
-            lambda tolerance=tolerance: _last(solve_bvp(scene, tolerance=tolerance)),  # type: ignore[misc]
-            repeats,
-        )
-    for tolerance in stepping:
-        yield trial(
-            STEPPING,
-            f"{tolerance:.0e}",
-            lambda tolerance=tolerance: float(stepped(scene, tolerance).moment[-1]),  # type: ignore[misc]
-            1,
-        )
-    if bench_elastica.installed() and elements:
-        bench_elastica.moment(scene.section, 8, 0.1)  # compiles, or loads what was
-        for n in elements:
-            yield trial(
-                PEER,
-                f"N {n}",
-                lambda n=n: bench_elastica.moment(scene.section, n, GAMMA),  # type: ignore[misc]
-                1,
-            )
+    trials = []
+    for attempt in chain(attempts(scene, extent, METHODS), _peer(extent)):
+        trials.append(attempt.trial(NAME, errors))
+        yield trials[-1]
+    if not elastica.installed():
+        yield "PyElastica: not installed, skipped"
+    yield front_text(NAME, trials)
 
 
-def _last(path: der.Path) -> float:
-    return float(path.moment[-1])
+def _peer(extent: Extent) -> Iterator[Attempt]:
+    section = CIRCLE.scene().section
+    if elastica.installed() and extent.elements:
+        elastica.moment(section, 8, 0.1)  # compiles or loads the kernels
+        for n in extent.elements:
+            work = partial(elastica.moment, section, n, GAMMA)
+            yield Attempt(PEER, f"N {n}", work, 1, memory=False)

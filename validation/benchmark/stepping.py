@@ -11,7 +11,6 @@ import numpy as np
 from scipy.integrate import solve_bvp
 
 import der
-from der.analysis.curve_distance import ReferenceCurve, curve_error
 from der.bvp.gauss import Array
 from der.geometry.ring import Ring
 
@@ -31,9 +30,10 @@ class Stepped:
     steps: int
     nodes: int  # of the last solution, over all segments
 
-    def errors(self, curve: ReferenceCurve) -> tuple[float, float]:
-        """Largest normal distances in M and in U."""
-        return curve_error(self.gamma, self.moment, self.energy, curve)
+    @property
+    def note(self) -> str:
+        """Steps and nodes in words."""
+        return f"{self.steps} steps, {self.nodes} nodes"
 
 
 def stepped(scene: der.Scene, tolerance: float) -> Stepped:

@@ -6,48 +6,30 @@ A case is plain JSON, so that one that failed can be kept, sent and run again.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from der.geometry.ring import (
+from der import (
     Ring,
+    Scene,
+    Section,
     circle,
     ellipse,
     profile,
     rectangle,
-    ring_from_json,
-    triangle_in_degrees,
+    rectangular_section,
+    section,
 )
-from der.geometry.section import Section, rectangular_section, section
-from der.scene import MEASURES, Scene
+from der.geometry.ring import ring_from_json, triangle_in_degrees
+from der.scene import MEASURES
 from der.utils.checks import Array
 
 Parameters = dict[str, Any]
+Draw = Callable[[np.random.Generator, int], Parameters]
 
-# How often a kind is drawn; "input" and "scale" cost nothing, the others a path or more.
-KINDS = {
-    "path": 30,
-    "beyond": 6,
-    "close folds": 5,
-    "natural curvature": 5,
-    "error bars": 6,
-    "angle": 8,
-    "moment": 6,
-    "relaxation": 3,
-    "bvp": 10,
-    "compare": 4,
-    "symmetry": 5,
-    "steps": 4,
-    "again": 4,
-    "threads": 2,
-    "points": 6,
-    "extreme": 6,
-    "scale": 4,
-    "input": 12,
-}
 BIRTH_OF_FOLDS = 1.839582  # h/t of the circle, nu = 0.3, at which its two folds are born
 
 
@@ -93,10 +75,10 @@ def cases(count: int, seed: int, *, most_edges: int = 2048) -> Iterator[Case]:
     most_edges : of the full ring; large ones are rare.
     """
     random = np.random.default_rng(seed)
-    names, weights = list(KINDS), np.array(list(KINDS.values()), dtype=float)
+    names, weights = list(KINDS), np.array([weight for weight, _ in KINDS.values()], dtype=float)
     for k in range(count):
         name = names[k] if k < len(names) else str(random.choice(names, p=weights / weights.sum()))
-        yield Case(name, _DRAWN[name](random, most_edges))
+        yield Case(name, KINDS[name][1](random, most_edges))
 
 
 # --- From parameters to the statement --------------------------------------------------------
@@ -148,16 +130,9 @@ def _log(random: np.random.Generator, low: float, high: float) -> float:
 
 def _section(random: np.random.Generator) -> Parameters:
     """h/t and nu over all that the solvers are made for, ends and the critical values too."""
-    h_over_t = float(
-        random.choice(
-            [
-                _log(random, 0.05, 100.0),
-                _log(random, 0.5, 6.0),
-                random.choice([0.05, 1.0, 1.5075766, 1.6, BIRTH_OF_FOLDS, 3.469928, 4.0, 100.0]),
-            ],
-            p=[0.4, 0.4, 0.2],
-        )
-    )
+    critical = [0.05, 1.0, 1.5075766, 1.6, BIRTH_OF_FOLDS, 3.469928, 4.0, 100.0]
+    drawn = [_log(random, 0.05, 100.0), _log(random, 0.5, 6.0), random.choice(critical)]
+    h_over_t = float(random.choice(drawn, p=[0.4, 0.4, 0.2]))
     nu = float(random.choice([0.0, 0.3, 0.5, random.uniform(0.0, 0.5)]))
     return {"h_over_t": h_over_t, "nu": nu}
 
@@ -214,6 +189,16 @@ def _path(random: np.random.Generator, most: int) -> Parameters:
     return {"ring": ring, **_section(random), "wants": wants}
 
 
+def _paths(most_here: int, **wants: Any) -> Draw:
+    """Paths on few edges, and what is always wanted of them."""
+
+    def draw(random: np.random.Generator, most: int) -> Parameters:
+        found = _path(random, min(most, most_here))
+        return found | {"wants": found["wants"] | wants}
+
+    return draw
+
+
 def _beyond(random: np.random.Generator, most: int) -> Parameters:
     """Several turns of the grips, or until folded."""
     found = _path(random, min(most, 64))
@@ -267,12 +252,6 @@ def _moment(random: np.random.Generator, most: int) -> Parameters:
     return found
 
 
-def _relaxation(random: np.random.Generator, most: int) -> Parameters:
-    found = _path(random, min(most, 32))
-    found["wants"] |= {"control": "angle", "solver": "relaxation", "stretch": "inextensible"}
-    return found
-
-
 def _bvp(random: np.random.Generator, most: int) -> Parameters:
     found = _path(random, most)
     wants = {
@@ -305,23 +284,11 @@ def _compare(random: np.random.Generator, most: int) -> Parameters:
     }
 
 
-def _symmetry(random: np.random.Generator, most: int) -> Parameters:
-    found = _path(random, min(most, 64))
-    found["wants"] |= {"sector": "auto", "tolerance": 1e-12, "stretch": "inextensible"}
-    return found
-
-
 def _steps(random: np.random.Generator, most: int) -> Parameters:
     """The same path in other steps."""
-    found = _path(random, min(most, 64))
-    found["wants"]["tolerance"] = 1e-11
-    found["wants"]["sector"] = "auto"
+    found = _paths(64, tolerance=1e-11, sector="auto")(random, most)
     longest = float(random.choice([0.05, 0.2, 1.0]))
     return found | {"steps": {"first": _log(random, 1e-4, 0.5), "longest": longest}}
-
-
-def _again(random: np.random.Generator, most: int) -> Parameters:
-    return _path(random, min(most, 128))
 
 
 def _threads(random: np.random.Generator, most: int) -> Parameters:
@@ -385,27 +352,28 @@ def _scale(random: np.random.Generator, most: int) -> Parameters:
 
 
 def _input(random: np.random.Generator, most: int) -> Parameters:
-    """Numbers of an argument and of a value; `stress_inputs` knows the lists."""
+    """Numbers of an argument and of a value; `inputs` knows the lists."""
     return {"argument": int(random.integers(2**16)), "value": int(random.integers(2**16))}
 
 
-_DRAWN = {
-    "path": _path,
-    "beyond": _beyond,
-    "close folds": _close_folds,
-    "natural curvature": _natural_curvature,
-    "error bars": _error_bars,
-    "angle": _angle,
-    "moment": _moment,
-    "relaxation": _relaxation,
-    "bvp": _bvp,
-    "compare": _compare,
-    "symmetry": _symmetry,
-    "steps": _steps,
-    "again": _again,
-    "threads": _threads,
-    "points": _points,
-    "extreme": _extreme,
-    "scale": _scale,
-    "input": _input,
+# How often a kind is drawn, and how; "input" and "scale" cost nothing, the others a path or more.
+KINDS: dict[str, tuple[int, Draw]] = {
+    "path": (30, _path),
+    "beyond": (6, _beyond),
+    "close folds": (5, _close_folds),
+    "natural curvature": (5, _natural_curvature),
+    "error bars": (6, _error_bars),
+    "angle": (8, _angle),
+    "moment": (6, _moment),
+    "relaxation": (3, _paths(32, control="angle", solver="relaxation", stretch="inextensible")),
+    "bvp": (10, _bvp),
+    "compare": (4, _compare),
+    "symmetry": (5, _paths(64, sector="auto", tolerance=1e-12, stretch="inextensible")),
+    "steps": (4, _steps),
+    "again": (4, _paths(128)),
+    "threads": (2, _threads),
+    "points": (6, _points),
+    "extreme": (6, _extreme),
+    "scale": (4, _scale),
+    "input": (12, _input),
 }

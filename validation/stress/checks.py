@@ -21,13 +21,18 @@ from der.scene import Scene
 from der.utils.checks import Array
 from validation.stress.random_rings import DENSE, LOOSE, largest_error, work_missing
 
-Fault = tuple[str, str]  # a name, which is a reason in the summary, and a sentence
+Fault = tuple[str, str]  # a name, which is the reason in the summary, and a sentence
 
 SAME = 1e-9  # rad: two gammas that are one
 MONOTONIC = 1e-7  # of the largest |M|: differences that are rounding
 GEOMETRY = 1e-10  # of a frame, an edge, a gap, in units of 1 and of a
 FEWEST = 4  # states in a row of which the work can be summed
 STABLE_KINDS = ("fold", "branch", "snap")  # across which the index may change
+
+
+def not_converged(reason: str) -> str:
+    """Name of the fault that a solver has given up; ``reason`` as in the record."""
+    return f"NotConverged {reason}"
 
 
 def faults(scene: Scene, path: Path) -> Iterator[Fault]:
@@ -260,7 +265,7 @@ def asymmetry(scene: Scene, shapes: Shapes) -> Array:
 # --- Two records of one ring -----------------------------------------------------------------
 
 
-def unlike(a: Path, b: Path, tolerance: float, *, indices: bool = True) -> Iterator[Fault]:
+def unlike(a: Path, b: Path, tolerance: float) -> Iterator[Fault]:
     """Where two paths of one ring differ: in their folds and limits, or at equal gamma."""
     for kind in ("fold", "limit"):
         pair = [[p.gamma for p in path.points if p.kind == kind] for path in (a, b)]
@@ -274,33 +279,33 @@ def unlike(a: Path, b: Path, tolerance: float, *, indices: bool = True) -> Itera
     scales = {
         name: float(np.abs(getattr(a, name)).max(initial=0.1)) for name in ("moment", "energy")
     }
-    tables = [_at_equal_gamma(path) for path in (a, b)]
-    for gamma in sorted(set(tables[0]) & set(tables[1])):
-        places = [table[gamma] for table in tables]
-        if len(places[0]) != len(places[1]):
+    for gamma, ours, theirs in _at_equal_gamma(a, b):
+        if len(ours) != len(theirs):
             if not _at_a_turn(a, gamma):
-                yield "other states", f"{len(places[0])} and {len(places[1])} at gamma = {gamma}"
+                yield "other states", f"{len(ours)} and {len(theirs)} at gamma = {gamma}"
             continue
-        for i, k in zip(*places, strict=True):
+        for i, k in zip(ours, theirs, strict=True):
             for name, scale in scales.items():
                 off = abs(getattr(a, name)[i] - getattr(b, name)[k]) / scale
                 if not off <= tolerance:
                     yield "other values", f"{name} differs by {off:.2g} at gamma = {gamma}"
                     return
-            known = indices and a.index[i] is not np.ma.masked and b.index[k] is not np.ma.masked
+            known = a.index[i] is not np.ma.masked and b.index[k] is not np.ma.masked
             if known and a.index[i] != b.index[k]:
                 yield "other index", f"{a.index[i]} and {b.index[k]} at gamma = {gamma}"
                 return
 
 
-def _at_equal_gamma(path: Path) -> dict[float, list[int]]:
-    """Positions of the states that are no special points, by gamma."""
-    special = {point.position for point in path.points}
-    found: dict[float, list[int]] = {}
-    for k, gamma in enumerate(path.gamma.tolist()):
-        if k not in special:
-            found.setdefault(gamma, []).append(k)
-    return found
+def _at_equal_gamma(a: Path, b: Path) -> Iterator[tuple[float, list[int], list[int]]]:
+    """Every gamma that both paths have, and the positions of its states; no special points."""
+    tables: list[dict[float, list[int]]] = [{}, {}]
+    for path, table in zip((a, b), tables, strict=True):
+        special = {point.position for point in path.points}
+        for k, gamma in enumerate(path.gamma.tolist()):
+            if k not in special:
+                table.setdefault(gamma, []).append(k)
+    for gamma in sorted(set(tables[0]) & set(tables[1])):
+        yield gamma, tables[0][gamma], tables[1][gamma]
 
 
 def _at_a_turn(path: Path, gamma: float) -> bool:
@@ -312,25 +317,21 @@ def outside_error_bars(rod: Path, reference: Path, times: float) -> Iterator[Fau
 
     Where the rod knows no error it claims nothing, neither values nor how many states there are.
     """
-    tables = [_at_equal_gamma(path) for path in (rod, reference)]
     errors: list[Any] = [rod.error, reference.error]
     for name in ("moment", "energy"):
         scale = float(np.abs(getattr(reference, name)).max())
-        for gamma in sorted(set(tables[0]) & set(tables[1])):
-            places = [table[gamma] for table in tables]
-            if len(places[0]) != len(places[1]):
-                sure = all(errors[0][name][i] is not None for i in places[0])
+        for gamma, ours, theirs in _at_equal_gamma(rod, reference):
+            if len(ours) != len(theirs):
+                sure = all(errors[0][name][i] is not None for i in ours)
                 if sure and not _at_a_turn(reference, gamma):
-                    yield "other states", f"{len(places[0])}, {len(places[1])} at gamma = {gamma}"
+                    yield "other states", f"{len(ours)}, {len(theirs)} at gamma = {gamma}"
                 continue
-            for i, k in zip(*places, strict=True):
+            for i, k in zip(ours, theirs, strict=True):
                 bars = errors[0][name][i], errors[1][name][k]
                 if None in bars:
                     continue
                 off = abs(getattr(rod, name)[i] - getattr(reference, name)[k])
                 if off > times * sum(bars) + 1e-8 * scale:
-                    yield (
-                        "outside error bars",
-                        f"{name} at gamma = {gamma} is {off / sum(bars):.1f} times its error off",
-                    )
+                    times_off = f"{off / sum(bars):.1f} times its error off"
+                    yield "outside error bars", f"{name} at gamma = {gamma} is {times_off}"
                     return

@@ -68,10 +68,17 @@ PERHAPS: dict[str, Any] = {
 }
 
 
-def _numbers(
-    where: str, names: tuple[str, ...], call: Callable[[Any], object], **refused: Any
-) -> Argument:
-    return Argument(where, names, call, NEVER | refused)
+SWITCHES = ("stability", "self_crossings", "error_bars", "shapes", "history", "modes", "unload")
+CHOICES = ("sector", "control", "solver", "curvature", "stretch", "until")  # of a scene
+
+
+def _but(*taken: str, **more: Any) -> dict[str, Any]:
+    """What is never taken, but for some of it, and more."""
+    return {name: value for name, value in NEVER.items() if name not in taken} | more
+
+
+def _numbers(where: str, names: str, call: Callable[[Any], object], **refused: Any) -> Argument:
+    return Argument(where, tuple(names.split()), call, NEVER | refused)
 
 
 def arguments() -> tuple[Argument, ...]:
@@ -80,94 +87,72 @@ def arguments() -> tuple[Argument, ...]:
 
 
 def _of_rings() -> Iterator[Argument]:
-    words = {name: value for name, value in NEVER.items() if name != "text"}
-    yield _numbers("circle", ("natural_curvature",), circle)
-    yield _numbers("ellipse", ("b_over_a",), ellipse, **NOT_POSITIVE, more=1.1)
-    yield Argument("ellipse", ("twist_axis",), lambda v: ellipse(0.5, v), words | {"z": "z"})
-    yield _numbers("rectangle", ("b_over_a",), lambda v: rectangle(v, 0.1), **NOT_POSITIVE)
-    yield _numbers("rectangle", ("r_over_a",), lambda v: rectangle(0.5, v), **NOT_POSITIVE)
-    yield Argument("rectangle", ("twist_axis",), lambda v: rectangle(0.5, 0.1, v), words)
-    yield _numbers("triangle", ("vertex_angle",), lambda v: triangle(v, 0.01), **NOT_POSITIVE)
-    yield _numbers("triangle", ("r_over_a",), lambda v: triangle(1.0, v), **NOT_POSITIVE)
+    axes = _but("text")
+    yield _numbers("circle", "natural_curvature", circle)
+    yield _numbers("ellipse", "b_over_a", ellipse, **NOT_POSITIVE, more=1.1)
+    yield Argument("ellipse", ("twist_axis",), lambda v: ellipse(0.5, v), axes | {"z": "z"})
+    yield _numbers("rectangle", "b_over_a", lambda v: rectangle(v, 0.1), **NOT_POSITIVE)
+    yield _numbers("rectangle", "r_over_a", lambda v: rectangle(0.5, v), **NOT_POSITIVE)
+    yield Argument("rectangle", ("twist_axis",), lambda v: rectangle(0.5, 0.1, v), axes)
+    yield _numbers("triangle", "vertex_angle", lambda v: triangle(v, 0.01), **NOT_POSITIVE)
+    yield _numbers("triangle", "r_over_a", lambda v: triangle(1.0, v), **NOT_POSITIVE)
     around = [0.0, 2.0 * math.pi]
     arrays = {"empty": [], "short": [0.0], "with nan": [0.0, math.nan], "falling": [1.0, 0.0]}
-    yield Argument(
-        "profile", ("arc_length",), lambda v: profile(v, [1.0, 1.0]), {**NEVER, **arrays}
-    )
-    yield Argument(
-        "profile", ("curvature", "arc_length"), lambda v: profile(around, v), {**NEVER, **arrays}
-    )
+    yield _numbers("profile", "arc_length", lambda v: profile(v, [1.0, 1.0]), **arrays)
+    yield _numbers("profile", "curvature arc_length", lambda v: profile(around, v), **arrays)
     rows = {"with nan": [[math.nan, 0.0]] * 9, "in one place": [[1.0, 1.0]] * 9, "few": [[0, 0]]}
-    wrong = {name: value for name, value in NEVER.items() if name != "none"} | rows
-    yield Argument("profile", ("points",), lambda v: profile(points=v), wrong)
+    yield Argument("profile", ("points",), lambda v: profile(points=v), _but("none", **rows))
     # arc lengths of a ring: an array of numbers of any shape
-    taken = ("list", "0-d array", "array", "bool", "numpy bool")
-    wrong = {name: value for name, value in NEVER.items() if name not in taken}
+    wrong = _but("list", "0-d array", "array", "bool", "numpy bool")
     for name in ("angle", "natural_angle", "curvature", "position"):
         yield Argument(f"Ring.{name}", ("s",), getattr(circle(), name), wrong)
     yield Argument("ring_from_json", ("shape", "ring"), lambda v: ring_from_json({"shape": v}), {})
 
 
 def _of_sections() -> Iterator[Argument]:
-    ratios = ("alpha", "beta")
-    yield _numbers(
-        "rectangular_section", ("h_over_t", *ratios), rectangular_section, **NOT_POSITIVE
-    )
-    yield _numbers("rectangular_section", ("nu",), lambda v: rectangular_section(4.0, v), more=0.6)
-    yield _numbers("section", ("alpha",), lambda v: section(v, 1.0), **NOT_POSITIVE)
-    yield _numbers("section", ("beta",), lambda v: section(1.0, v), **NOT_POSITIVE)
-    optional = {name: value for name, value in NEVER.items() if name != "none"}
-    yield Argument("Section", ("h_over_t",), lambda v: Section(1.0, 1.0, v), optional)
-    yield Argument("Section", ("nu",), lambda v: Section(1.0, 1.0, 1.0, v), optional)
-    units = ("moment", "energy", "length", "force")
+    positive = NOT_POSITIVE
+    yield _numbers("rectangular_section", "h_over_t alpha beta", rectangular_section, **positive)
+    yield _numbers("rectangular_section", "nu", lambda v: rectangular_section(4.0, v), more=0.6)
+    yield _numbers("section", "alpha", lambda v: section(v, 1.0), **positive)
+    yield _numbers("section", "beta", lambda v: section(1.0, v), **positive)
+    yield Argument("Section", ("h_over_t",), lambda v: Section(1.0, 1.0, v), _but("none"))
+    yield Argument("Section", ("nu",), lambda v: Section(1.0, 1.0, 1.0, v), _but("none"))
+    units = "moment energy length force"
     usual = {"young_modulus": 1e9, "nu": 0.3, "h": 1.0, "t": 0.1, "a": 10.0}
     for name in usual:
-        refused = {} if name == "nu" else NOT_POSITIVE
-        yield _numbers("Scale.of", (name, *units), _with(Scale.of, usual, name), **refused)
-    ones = dict.fromkeys(units, 1.0)
-    for name in units:
-        yield _numbers("Scale", (name,), _with(Scale, ones, name), **NOT_POSITIVE)
+        refused = {} if name == "nu" else positive
+        yield _numbers("Scale.of", f"{name} {units}", _with(Scale.of, usual, name), **refused)
+    ones = dict.fromkeys(units.split(), 1.0)
+    for name in ones:
+        yield _numbers("Scale", name, _with(Scale, ones, name), **positive)
 
 
 def _with(
-    make: Callable[..., object], usual: Mapping[str, float], name: str
+    make: Callable[..., object], usual: Mapping[str, Any], name: str
 ) -> Callable[[Any], object]:
     """What is made of the usual values with another for ``name``."""
     return lambda value: make(**{**usual, name: value})
 
 
 def _of_scenes() -> Iterator[Argument]:
-    ring, bar = circle(), rectangular_section(4.0)
+    usual = {"ring": circle(), "section": rectangular_section(4.0)}
 
-    def scene(name: str) -> Callable[[Any], object]:
-        return lambda value: Scene(ring, bar, **{name: value})
+    def argument(name: str, refused: Mapping[str, Any]) -> Argument:
+        return Argument("Scene", (name,), _with(Scene, usual, name), refused)
 
-    yield Argument("Scene", ("ring",), lambda v: Scene(v, bar), NEVER)
-    yield Argument("Scene", ("section",), lambda v: Scene(ring, v), NEVER)
+    for name in usual:
+        yield argument(name, NEVER)
     for name in ("gamma_max", "a_over_t", "tolerance"):
-        yield _numbers("Scene", (name,), scene(name), **NOT_POSITIVE)
-    yield _numbers("Scene", ("n_edges",), scene("n_edges"), odd=63, few=4, many=2**20)
-    for name in (
-        "stability",
-        "self_crossings",
-        "error_bars",
-        "shapes",
-        "history",
-        "modes",
-        "unload",
-    ):
-        taken = ("bool", "numpy bool", *(("none",) if name == "self_crossings" else ()))
-        wrong = {key: value for key, value in NEVER.items() if key not in taken}
-        yield Argument("Scene", (name,), scene(name), wrong)
-    for name in ("sector", "control", "solver", "curvature", "stretch", "until"):
-        taken = ("none",) if name == "until" else ()
-        wrong = {key: value for key, value in NEVER.items() if key not in taken}
-        yield Argument("Scene", (name,), scene(name), wrong)
+        yield argument(name, NEVER | NOT_POSITIVE)
+    yield argument("n_edges", NEVER | {"odd": 63, "few": 4, "many": 2**20})
+    optional = {"self_crossings": ("none",), "until": ("none",)}
+    for name in SWITCHES:
+        yield argument(name, _but("bool", "numpy bool", *optional.get(name, ())))
+    for name in CHOICES:
+        yield argument(name, _but(*optional.get(name, ())))
     lists = {"past the end": [9.0], "negative": [-1.0], "with nan": [math.nan], "words": ["1"]}
-    wrong = {key: value for key, value in NEVER.items() if key not in ("none", "list", "array")}
     # of what iterates to nothing or to numbers, nothing is wrong
-    wrong = {key: value for key, value in wrong.items() if key not in ("dict", "bytes")}
-    yield Argument("Scene", ("save_at",), scene("save_at"), wrong | lists)
+    yield argument("save_at", _but("none", "list", "array", "dict", "bytes", **lists))
 
 
 def _of_records() -> Iterator[Argument]:

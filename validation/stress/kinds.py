@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -24,12 +23,13 @@ from der.records.path import Path
 from der.rod.gripped_ring import sector
 from der.scene import CROSSINGS_UP_TO, Scene
 from der.utils.checks import Array
-from validation.stress.cases import ring_of, scene_of, section_of
+from validation.stress.cases import KINDS, scene_of
 from validation.stress.checks import (
     Fault,
     asymmetry,
     denser,
     faults,
+    not_converged,
     outside_error_bars,
     too_uncertain,
     unlike,
@@ -61,24 +61,30 @@ def _scene(parameters: Mapping[str, Any], **more: Any) -> Scene:
 
 def _folded(scene: Scene) -> Path:
     """The path, finished or not."""
+    return _finished_or_not(der.fold, scene)
+
+
+def _finished_or_not(solver: Callable[[Scene], Path], scene: Scene) -> Path:
     try:
-        return der.fold(scene)
+        return solver(scene)
     except NotConverged as failure:
-        if failure.path.status != "not converged" or failure.path.message != str(failure):
+        path = failure.path
+        if path.status != "not converged" or path.message != str(failure):
             raise AssertionError("the path that is left does not say why it is") from None
-        return failure.path
+        return path
 
 
-def _unfinished(path: Path) -> Iterator[Fault]:
+def unfinished(path: Path) -> Iterator[Fault]:
+    """Why a path is not finished."""
     if path.status != "done":
-        yield "NotConverged", path.message
+        yield not_converged(path.reason), path.message
 
 
 def _path(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     """A path, and every test that a single one can be put to."""
     scene = _scene(parameters, shapes=True)
     path = _folded(scene)
-    yield from _unfinished(path)
+    yield from unfinished(path)
     yield from _judged(scene, path)
     if scene.unload and path.status == "done" and not any(p.kind == "snap" for p in path.points):
         yield from _returned(scene, path)
@@ -105,28 +111,12 @@ def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator
     """Energy is work; where the states are too few to tell, they are asked for again, densely."""
     lost = work_lost(path)
     if lost > LOOSE and path.status == "done":
-        wants = {name: getattr(scene, name) for name in _WANTS} | {
-            "save_at": denser(path, scene.gamma_max)
-        }
-        lost = work_lost(solver(Scene(scene.ring, scene.section, **wants)), asked=True)
+        densely = replace(
+            scene, save_at=denser(path, scene.gamma_max), shapes=False, error_bars=False
+        )
+        lost = work_lost(solver(densely), asked=True)
     if lost > LOOSE and path.status == "done":
         yield "energy is not work", f"U and the integral of 4 M dgamma differ by {lost:.2g} of U"
-
-
-_WANTS = (
-    "n_edges",
-    "sector",
-    "stability",
-    "control",
-    "unload",
-    "solver",
-    "gamma_max",
-    "until",
-    "curvature",
-    "stretch",
-    "a_over_t",
-    "tolerance",
-)
 
 
 def _returned(scene: Scene, path: Path, steps: float = RETURNED) -> Iterator[Fault]:
@@ -145,7 +135,7 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
     Its frames are taken from the record; the internal forces, which are not in it, are fitted. So
     residual, energy and moment are computed anew, and Tw + Wr.
     """
-    piece = sector(
+    ring = sector(
         scene.ring,
         scene.section,
         scene.n_edges,
@@ -154,7 +144,7 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
         stretching=scene.stretching,
     )
     raw = path.raw or {}
-    body = piece.body
+    body = ring.body
     # arc lengths are rounded, and so are cells, which are their differences
     rounding = 1e-15 * scene.ring.length * float(body.stiffness.max() / body.cell.min() ** 2)
     columns = [np.asarray(raw.get(name, getattr(path, name))) for name in _COLUMNS]
@@ -163,28 +153,30 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
     if scene.stretching and tolerance > LOOSEST:  # a gap, all in one edge, would be stretch
         return
     links = scene.n_edges <= min(256, CROSSINGS_UP_TO)
-    worst = dict.fromkeys(("residual", "energy", "moment", "link"), 0.0)
+    worst = np.zeros(len(_BALANCED))
     for k, (gamma, moment, energy) in enumerate(zip(*columns, strict=True)):
         quat = _quaternions(shapes.frames[k])
         edge = shapes.x[k] - np.roll(shapes.x[k], 1, axis=0)
         length = np.sum(edge * shapes.frames[k, :, 2], axis=1)
-        stretch = length / piece.body.length - 1.0 if scene.stretching else np.zeros(len(quat))
-        residual, noise, found_energy, found_moment = _residual(piece, quat, stretch, float(gamma))
+        stretch = length / ring.body.length - 1.0 if scene.stretching else np.zeros(len(quat))
+        residual, noise, found_energy, found_moment = _residual(ring, quat, stretch, float(gamma))
         allowed = 20.0 * max(tolerance, 10.0 * noise) + 1e-14 * scene.stretching + rounding
-        worst["residual"] = max(worst["residual"], residual / allowed)
-        off = abs(found_energy - energy) / (1e-8 * scales[2] + allowed)
-        worst["energy"] = max(worst["energy"], off)
-        off = abs(found_moment - moment) / (1e-7 * scales[1] + scene.n_edges * allowed)
-        worst["moment"] = max(worst["moment"], off)
         flat = gamma != 0.0 and float(np.ptp(shapes.x[k, :, 0])) < 1e-3
-        if links and not flat and k % 4 == 0:
-            worst["link"] = max(worst["link"], link(quat, length)[1] / (1e-8 + 100.0 * tolerance))
-    for name, size in worst.items():
+        linked = link(quat, length)[1] if links and not flat and k % 4 == 0 else 0.0
+        off = (
+            residual / allowed,
+            abs(found_energy - energy) / (1e-8 * scales[2] + allowed),
+            abs(found_moment - moment) / (1e-7 * scales[1] + scene.n_edges * allowed),
+            linked / (1e-8 + 100.0 * tolerance),
+        )
+        worst = np.maximum(worst, off)
+    for name, size in zip(_BALANCED, worst, strict=True):
         if not size <= 1.0:
             yield f"{name} of the full ring", f"{size:.3g} times what rounding allows"
 
 
 _COLUMNS = ("gamma", "moment", "energy")
+_BALANCED = ("residual", "energy", "moment", "link")
 
 
 def _quaternions(frames: Array) -> Array:
@@ -194,21 +186,21 @@ def _quaternions(frames: Array) -> Array:
 
 
 def _residual(
-    piece: Any, quat: Array, stretch: Array, gamma: float
+    ring: Any, quat: Array, stretch: Array, gamma: float
 ) -> tuple[float, float, float, float]:
     """Residual, its rounding error, energy and M of a state of the full ring."""
-    held = piece.held
+    held = ring.held
     force = np.zeros(len(held.target))
-    system = assemble(piece.body, held, quat, stretch, force, gamma)
+    system = assemble(ring.body, held, quat, stretch, force, gamma)
     free = held.free.reshape(-1)
     gradient = system.grad.reshape(-1)[free]
     border = system.border.reshape(-1, len(force))[free]
     force = -np.linalg.lstsq(border, gradient, rcond=None)[0]
-    system = assemble(piece.body, held, quat, stretch, force, gamma)
+    system = assemble(ring.body, held, quat, stretch, force, gamma)
     residual = max(
         float(np.abs(system.grad.reshape(-1)[free]).max()), float(np.abs(system.gap).max())
     )
-    return residual, system.noise, system.energy, piece.moment(system.load_grad)
+    return residual, system.noise, system.energy, ring.moment(system.load_grad)
 
 
 # --- The other kinds -------------------------------------------------------------------------
@@ -222,11 +214,8 @@ def _bvp(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     def solver(scene: Scene) -> Path:
         return solve_bvp(scene, tolerance=tolerance)
 
-    try:
-        path = solver(scene)
-    except NotConverged as failure:
-        path = failure.path
-    yield from _unfinished(path)
+    path = _finished_or_not(solver, scene)
+    yield from unfinished(path)
     yield from (fault for fault in faults(scene, path) if tolerance < 1e-5 or fault[0] != "start")
     yield from too_uncertain(path, tolerance)
     if tolerance <= 1e-5 and len(path):
@@ -254,7 +243,7 @@ def _symmetry(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     """A path on the sector is that on the full ring."""
     found = [_folded(_scene(parameters, sector=name)) for name in ("auto", "full")]
     for path in found:
-        yield from _unfinished(path)
+        yield from unfinished(path)
     if all(path.status == "done" for path in found):
         yield from unlike(found[0], found[1], 1e-7)
 
@@ -265,7 +254,7 @@ def _steps(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     usual = _folded(scene)
     with _stepping(**parameters["steps"]):
         other = _folded(scene)
-    yield from _unfinished(other)
+    yield from unfinished(other)
     if usual.status == other.status == "done":
         yield from unlike(usual, other, 1e-7)
 
@@ -299,22 +288,7 @@ def _threads(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def _without_time(path: Path) -> str:
-    return re.sub(r'"solve_s": [^,}]*', '"solve_s": 0', path.to_json())
-
-
-def _points(parameters: Mapping[str, Any]) -> Iterator[Fault]:
-    """A ring through noisy points: refused in a sentence, or folded like any other."""
-    try:
-        ring = ring_of(parameters["ring"])
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
-    try:
-        scene = Scene(ring, section_of(parameters), shapes=True, **parameters["wants"])
-    except ValueError as wrong:
-        raise Refused(str(wrong)) from None
-    path = _folded(scene)
-    yield from _unfinished(path)
-    yield from _judged(scene, path)
+    return replace(path, timing=replace(path.timing, solve_s=0.0)).to_json()
 
 
 def _scale(parameters: Mapping[str, Any]) -> Iterator[Fault]:
@@ -354,24 +328,14 @@ def _input(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 
 _TAKES_NUMBERS = ("circle", "section", "rectangular_section", "Scale", "Scale.of", "Section")
 
-_Runner = Callable[[Mapping[str, Any]], Iterator[Fault]]
-RUN: dict[str, _Runner] = {
-    "path": _path,
-    "beyond": _path,
-    "close folds": _path,
-    "natural curvature": _path,
-    "error bars": _path,
-    "angle": _path,
-    "moment": _path,
-    "relaxation": _path,
+Run = Callable[[Mapping[str, Any]], Iterator[Fault]]
+RUN: dict[str, Run] = dict.fromkeys(KINDS, _path) | {
     "bvp": _bvp,
     "compare": _compare,
     "symmetry": _symmetry,
     "steps": _steps,
     "again": _again,
     "threads": _threads,
-    "points": _points,
-    "extreme": _path,
     "scale": _scale,
     "input": _input,
 }

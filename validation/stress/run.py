@@ -1,17 +1,16 @@
-"""An attempt to break both solvers, and an account of what happened: `der stress`.
+"""An attempt to break both solvers, and an account of what happened: `python -m validation stress`.
 
     summary = validation.stress.run.stress("quick")
     validation.stress.run.repeat(summary.failed[0].case)   # one of them again
 
-A failure that says what it is in a sentence that the documentation knows is explained: a ValueError
-about an argument, a `NotConverged`. Anything else is not, whatever the scene: another exception, no
-answer within the time limit, a warning, a number that is not finite, a record that contradicts
-itself, a residual above the tolerance, energy that is not work.
+A failure is explained if the statement refuses the case, or if a solver gives up for one of the
+reasons in `EXPLAINED`, which the documentation describes. Anything else is not explained, whatever
+the scene: another exception, no answer within the time limit, a warning, a number that is not
+finite, a record that contradicts itself, a residual above the tolerance, energy that is not work.
 """
 
 from __future__ import annotations
 
-import re
 import signal
 import sys
 import threading
@@ -27,56 +26,44 @@ from typing import Any, TypeAlias
 import numpy as np
 
 import der
-from der.analysis.snap import TO_AND_FRO
-from der.bvp import collocation
-from der.bvp.solve import solve_bvp
 from der.diagram.jobs import Jobs
 from der.diagram.workers import processes
 from der.diagram.workers import workers as started
-from der.errors import NotConverged
-from der.geometry.ring import circle
-from der.geometry.section import section
-from der.rod import equilibrium as newton
-from der.rod import relaxation
-from der.scene import Scene
+from der.errors import Reason
 from der.utils import checks
 from der.utils.files import FilePath
 from der.utils.interrupts import put_off
 from validation.stress.cases import Case, case_from_json, cases
-from validation.stress.checks import Fault
+from validation.stress.checks import Fault, not_converged
 from validation.stress.kinds import RUN, Refused
 from validation.stress.summary import Failure, Summary
 
 LEVELS = {"quick": (120, 128), "long": (10_000, 2048)}  # number of cases, edges at most
 BATCH = 8  # cases that a worker gets at a time
 TIME_LIMIT = 120.0  # s of CPU time, of one case: what takes longer hangs
+SAVE_EVERY = 30.0  # s
+REFUSED = "ValueError"
 
-_NUMBER = re.compile(r"-?\b\d[\d.]*(e[-+]?\d+)?")
-_REASON = "|".join(  # with # for every number, as everywhere below
-    re.escape(_NUMBER.sub("#", words))
-    for advice in (newton.ADVICE, relaxation.ADVICE, collocation.ADVICE)
-    for words in advice.values()
+# Reasons of NotConverged that the documentation describes, and those that no failure may have.
+EXPLAINED = frozenset(
+    {
+        Reason.TOO_MANY_ITERATIONS,
+        Reason.DIVERGED,
+        Reason.OUT_OF_RANGE,
+        Reason.SINGULAR,
+        Reason.TOO_SHARP,
+        Reason.OTHER_BRANCH,
+        Reason.NO_START,
+        Reason.TOO_MANY_STEPS,
+        Reason.BREAKS_SYMMETRY,
+        Reason.NOT_AT_REST,
+        Reason.NO_MINIMUM,
+        Reason.INACCURATE,
+    }
 )
-# Sentences of NotConverged that the documentation explains, from the first word to the last.
-EXPLAINED = re.compile(
-    rf"no step forward from gamma = #: ((vertex # )?({_REASON})|the path turns too sharply"
-    r"|the path changes its orientation)"
-    r"|the (path|march) has not ended after # steps|the march would not end within # steps"
-    rf"|the flat ring is no (equilibrium|solution): ({_REASON})"
-    r"|the ring loses stability at gamma = # by a mode \([a-z ]+\) that breaks the symmetry of its"
-    r" [a-z]+; the sector 'full' follows it"
-    r"|the ring lands at gamma = # in a state that is unstable to modes \([a-z ]+\) that break the"
-    r" symmetry of its [a-z]+; the sector 'full' follows it"
-    rf"|the snap at gamma = # came to rest in no minimum: (index (#|None)|{TO_AND_FRO}|{_REASON})"
-    rf"|(the snap at gamma = # came to no rest:|at gamma = # the ring) (vertex # )?({_REASON})"
-    rf"|gamma = # is no equilibrium: ({_REASON})"
-    r"|the state at gamma = # is no minimum: it cannot be marched on"
-    rf"|no equilibrium within a step, at gamma = # \(s = # of #\): ({_REASON})"
-    rf"|no solution within a step, at gamma = #: ({_REASON})"
-    r"|an error of # is left on # intervals at gamma = #"
-    r"|rounding leaves an error of # on # intervals, as on fewer, at gamma = #"
-    rf"|no solution on # intervals at gamma = #: ({_REASON})"
-)
+NOT_EXPLAINED = frozenset({Reason.CONVERGED, Reason.TURNED_BACK, Reason.INTERRUPTED})
+_EXPLAINED_NAMES = {REFUSED, *(not_converged(reason.word) for reason in EXPLAINED)}
+_EXPLAINED_NAMES.add(not_converged(""))  # until every solver gives its reason
 
 
 def stress(
@@ -118,20 +105,20 @@ def stress(
     checks.count("seed", seed)
     number, most_edges = LEVELS[level]
     number = number if count is None else count
+    width = processes(workers)
     summary = Summary(level, seed)
     show = _shown if progress is None else progress
-    tried = cases(number, seed, most_edges=most_edges)
-    started = saved = time.monotonic()
+    began = saved = time.monotonic()
     try:
-        for case, found, seconds in _done(tried, processes(workers)):
+        for case, found, seconds in _done(cases(number, seed, most_edges=most_edges), width):
             now = time.monotonic()
             summary.add(case, found, seconds)
-            summary.seconds = now - started
+            summary.seconds = now - began
             show(
                 f"{summary.cases} of {number} cases, {summary.failures} failures, "
                 f"{summary.unexplained} unexplained, {summary.seconds:.0f} s"
             )
-            if file is not None and now - saved > 30.0:
+            if file is not None and now - saved > SAVE_EVERY:
                 summary.save(file)
                 saved = now
     except KeyboardInterrupt:  # what there is is kept
@@ -179,27 +166,26 @@ def _repeated(batch: tuple[_Numbered, ...]) -> list[_Done]:
     _load_kernels()
     results = []
     for thing in batch:
-        begun = time.monotonic()
+        began = time.monotonic()
         found = repeat(thing.case)
-        results.append((found, time.monotonic() - begun))
+        results.append((found, time.monotonic() - began))
     return results
 
 
 def _died(thing: _Numbered) -> _Done:
     """Of a case that has ended its worker, time and again."""
-    text = "the process that worked on it died [unexpected]"
-    failure = Failure(thing.case, _reason("Died", text), text, explained=False, seconds=0.0)
-    return (failure,), 0.0
+    text = "the process that worked on it died"
+    return (Failure(thing.case, "worker died", text, explained=False, seconds=0.0),), 0.0
 
 
 @cache
 def _load_kernels() -> None:
     """Compile or load what is timed, so that no case waits for it."""
-    scene = Scene(circle(), section(1.0, 1.0), n_edges=8, gamma_max=0.1)
-    for wants in ({}, {"control": "angle", "unload": True, "solver": "relaxation"}):
-        der.fold(replace(scene, **wants))  # type: ignore[arg-type]
+    scene = der.Scene(der.circle(), der.section(1.0, 1.0), n_edges=8, gamma_max=0.1)
+    der.fold(scene)
     der.fold(replace(scene, control="angle"))
-    solve_bvp(scene, tolerance=1e-6)
+    der.fold(replace(scene, control="angle", unload=True, solver="relaxation"))
+    der.solve_bvp(scene, tolerance=1e-6)
 
 
 def _shown(line: str) -> None:
@@ -216,7 +202,7 @@ def repeat(case: Case | Mapping[str, Any]) -> tuple[Failure, ...]:
         If it is no case.
     """
     known = case if isinstance(case, Case) else case_from_json(case)
-    started = time.monotonic()
+    began = time.monotonic()
     found: list[Fault] = []
     try:
         with _time_limit(TIME_LIMIT), warnings.catch_warnings():
@@ -224,31 +210,17 @@ def repeat(case: Case | Mapping[str, Any]) -> tuple[Failure, ...]:
             with np.errstate(divide="raise", over="raise", invalid="raise"):
                 found.extend(RUN[known.kind](known.parameters))
     except Refused as refused:
-        found.append(("ValueError", str(refused)))
-    except NotConverged as failure:
-        found.append(("NotConverged", str(failure)))
+        found.append((REFUSED, str(refused)))
+    except der.NotConverged as failure:
+        found.append((not_converged(failure.path.reason), str(failure)))
     except KeyboardInterrupt:
         raise
     except BaseException as wrong:  # whatever it is, it is what is looked for
-        found.append((type(wrong).__name__, f"{wrong} [unexpected]"))
-    seconds = time.monotonic() - started
+        found.append((f"unexpected {type(wrong).__name__}", str(wrong)))
+    seconds = time.monotonic() - began
     return tuple(
-        Failure(known, _reason(name, text), text, _explained(name, text), seconds)
-        for name, text in found
+        Failure(known, name, text, name in _EXPLAINED_NAMES, seconds) for name, text in found
     )
-
-
-def _reason(name: str, text: str) -> str:
-    """A reason by which failures are counted: without the numbers and values of one case."""
-    plain = re.sub(r"\(s = .*?\)", "(s)", _NUMBER.sub("#", text))
-    plain = re.sub(r"(, )?got .*|arc length #.*", "", plain)
-    return f"{name}: {plain}"[:160]
-
-
-def _explained(name: str, text: str) -> bool:
-    if name == "ValueError":
-        return "[unexpected]" not in text
-    return name == "NotConverged" and EXPLAINED.fullmatch(_NUMBER.sub("#", text)) is not None
 
 
 @contextmanager

@@ -16,7 +16,7 @@ class Failure:
     """A case that did not go well."""
 
     case: Case
-    reason: str  # the class of the exception, or the name of the fault, and the sentence
+    reason: str  # by which failures are counted: a refusal, why a solver gave up, or a fault
     message: str
     explained: bool
     seconds: float
@@ -53,9 +53,10 @@ class Summary(Saved):
             f"{self.cases} cases in {self.seconds:.0f} s, {self.failures} failures, "
             f"{self.unexplained} unexplained" + (", interrupted" if self.interrupted else "")
         ]
-        strange = {failure.reason for failure in self.failed if not failure.explained}
+        examples = {failure.reason: failure for failure in reversed(self.failed)}
         for reason, count in sorted(self.by_reason.items(), key=lambda item: -item[1]):
-            lines.append(f"{count:6d}  {'UNEXPLAINED ' if reason in strange else ''}{reason}")
+            mark = "" if examples[reason].explained else "UNEXPLAINED "
+            lines.append(f"{count:6d}  {mark}{reason}, first: {examples[reason].message}"[:160])
         return "\n".join(lines)
 
     def add(self, case: Case, found: Sequence[Failure], seconds: float) -> None:

@@ -28,7 +28,8 @@ from der.errors import ContinuationFailed
 from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation_vector
 from der.problem import Options, Statistics
-from der.records.landscape import Barriers, Pass, Rest, Saddle
+from der.records.landscape import Barriers, Heights, Pass, Rest, Saddle
+from der.records.record import SolveTime
 from der.rod.dynamics import EndState, flow
 from der.rod.free_ring import FreeRing, released
 from der.rod.rod import State
@@ -95,21 +96,25 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
     ring = ring_of(scene)
     best = across[0] if across else None
     way, shapes = _way(best) if best is not None else (np.zeros((0, 2)), np.zeros((0, 0, 3)))
+    heights = (
+        (None, None)
+        if best is None
+        else (best.saddle.energy - rests[0].energy, best.saddle.energy - rests[-1].energy)
+    )
     return Pass(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        numerics(scene, ring),
-        None if best is None else best.saddle.energy - rests[0].energy,
-        None if best is None else best.saddle.energy - rests[-1].energy,
-        twisting,
-        None if best is None else best.saddle,
-        tuple(one.saddle for one in found),
-        way,
-        shapes,
-        why,
-        "interrupted" if pressed else "done" if rests else "not converged",
-        {},
-        time.perf_counter() - started,
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=numerics(scene, ring),
+        barriers=Heights(*heights),
+        twisting=twisting,
+        saddle=None if best is None else best.saddle,
+        saddles=tuple(one.saddle for one in found),
+        way=way,
+        why=why,
+        status="interrupted" if pressed else "done" if rests else "not converged",
+        extrapolated={},
+        timing=SolveTime(time.perf_counter() - started),
+        shapes=shapes,
     )
 
 

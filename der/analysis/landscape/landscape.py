@@ -155,8 +155,8 @@ def barriers(rests: Sequence[Rest], *, folded: bool, message: str = "") -> Barri
             why["fold"] = "the saddle is the folded ring itself"
     elif (saddle.index_moment or 0) > 1:
         why["fold"] = why["open"] = (
-            f"the saddle has {saddle.index_moment} unstable modes, and at least one of them breaks the"
-            " symmetry: there is a lower saddle beside it"
+            f"the saddle has {saddle.index_moment} unstable modes, and at least one of them breaks"
+            " the symmetry: there is a lower saddle beside it"
         )
     opening = saddle.energy - end.energy if end.kind == "well" else None
     return Barriers(saddle.energy - flat.energy, opening, highest, why)

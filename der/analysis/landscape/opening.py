@@ -22,6 +22,7 @@ from der.analysis.request import ring_of
 from der.continuation.richardson import Extrapolated, limits
 from der.records.landscape import Pass
 from der.records.opening import LeastPush
+from der.records.record import SolveTime
 from der.scene import Scene, meshes
 from der.utils.checks import Array
 from der.utils.interrupts import interrupts_between_states
@@ -77,19 +78,19 @@ def least_push(
     if pressed:
         why = "stopped by the user before all pairs of points were tried"
     return LeastPush(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        numerics(scene, ring_of(scene, "full")) | {"points": grid},
-        free.open,
-        free.twisting.open,
-        tuple(push for push, _ in search.all) if search is not None else (),
-        search.least(dead=False) if search is not None else {},
-        search.least(dead=True) if search is not None else {},
-        sure,
-        why,
-        "interrupted" if pressed else status,
-        time.perf_counter() - started,
-        _shapes(search) if search is not None else {},
+        status="interrupted" if pressed else status,
+        why=why,
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=numerics(scene, ring_of(scene, "full")) | {"points": grid},
+        barrier=free.open,
+        twisting=free.twisting.open,
+        least=search.least(dead=False) if search is not None else {},
+        least_dead=search.least(dead=True) if search is not None else {},
+        extrapolated=sure,
+        pushes=tuple(push for push, _ in search.all) if search is not None else (),
+        timing=SolveTime(time.perf_counter() - started),
+        shapes=_shapes(search) if search is not None else {},
     )
 
 

@@ -69,7 +69,7 @@ class Search:
 def scan(
     search: Search, grid: int, pressed: list[int], progress: Callable[[float], object] | None
 ) -> None:
-    """Try all actuators at the pairs of a grid; ``progress`` is called with the share that is done."""
+    """Try all actuators at the pairs of a grid; ``progress`` is told the share that is done."""
     pairs = list(_pairs(search, grid))
     for k, pair in enumerate(pairs):
         if pressed:

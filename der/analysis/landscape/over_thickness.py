@@ -13,6 +13,7 @@ from der.continuation.richardson import Extrapolated
 from der.geometry.ring import Ring
 from der.geometry.section import rectangular_section
 from der.records.landscape import BarrierCurves, Landscape, Pass
+from der.records.record import SolveTime
 from der.scene import Scene
 from der.utils.interrupts import interrupts_between_states
 
@@ -85,7 +86,7 @@ def barriers_over(
         error=dict(zip(_BARRIERS, np.array(errors).reshape(-1, 4).T, strict=True))
         if error_bars
         else {},
-        solve_s=time.perf_counter() - started,
+        timing=SolveTime(time.perf_counter() - started),
     )
 
 

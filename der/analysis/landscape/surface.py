@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,8 @@ from der.analysis.request import Request, ring_of
 from der.analysis.snap import Landing
 from der.kernels.quaternions import Array
 from der.problem import Options, Point, Statistics
-from der.records.energy_surface import Surface
+from der.records.energy_surface import NoMinimum, Surface
+from der.records.record import SolveTime
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import E3, GrippedRing
 from der.rod.rod import State
@@ -109,20 +111,20 @@ def energy_surface(
         snapped = _snaps(ring, request, float(angles[-1])) if snaps and run.done else ()
     folds = line[[k for k, one in enumerate(points) if one.kind == "fold"]]
     return Surface(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        numerics(scene, ring) | {"shape": list(shape), "ceiling": flood.ceiling},
-        angles,
-        flood.distance,
-        *_maps(flood),
-        _reasons(flood, run.status),
-        (line[:, 0], line[:, 1], line[:, 2]),
-        folds,
-        line[without_load],
-        snapped,
-        run.status,
-        run.message,
-        run.seconds,
+        status=run.status,
+        message=run.message,
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=numerics(scene, ring) | {"shape": list(shape), "ceiling": flood.ceiling},
+        gamma=angles,
+        distance=flood.distance,
+        **_maps(flood),
+        reasons=_reasons(flood, run.status),
+        path=line,
+        folds=folds,
+        rests=line[without_load],
+        snaps=snapped,
+        timing=SolveTime(run.seconds),
     )
 
 
@@ -157,9 +159,7 @@ def _seeds(flood: Flood, points: Sequence[Point[Equilibrium]]) -> Iterator[tuple
                 yield (i, int(np.argmin(away))), state.but(force=np.append(state.force, 0.0))
 
 
-def _maps(
-    flood: Flood,
-) -> tuple[Array, Array, Array, np.ndarray, tuple[tuple[tuple[float, ...], ...], ...]]:
+def _maps(flood: Flood) -> dict[str, Any]:
     """Energy, moment, force and index of the lowest minimum in each cell, and all energies."""
     n, m = len(flood.gamma), len(flood.distance)
     energy, moment, force = (np.full((n, m), np.nan) for _ in range(3))
@@ -175,7 +175,7 @@ def _maps(
     levels = tuple(
         tuple(tuple(one.energy for one in flood.among((i, j))) for j in range(m)) for i in range(n)
     )
-    return energy, moment, force, ways, levels
+    return {"energy": energy, "moment": moment, "force": force, "index": ways, "minima": levels}
 
 
 def _index(ring: GrippedRing, supports: Supports, state: State) -> int:
@@ -194,17 +194,19 @@ def _index(ring: GrippedRing, supports: Supports, state: State) -> int:
     return total
 
 
-def _reasons(flood: Flood, status: str) -> dict[Cell, str]:
+def _reasons(flood: Flood, status: str) -> tuple[NoMinimum, ...]:
     """Why cells have no minimum, for all of them."""
     unseen = (
         "not reached before the computation was stopped"
         if status == "interrupted"
         else "no neighbour has a minimum"
     )
-    cells = np.ndindex(len(flood.gamma), len(flood.distance))
-    return {
-        (i, j): flood.reasons.get((i, j), unseen) for i, j in cells if (i, j) not in flood.minima
-    }
+    return tuple(
+        NoMinimum(gamma, distance, flood.reasons.get((i, j), unseen))
+        for i, gamma in enumerate(flood.gamma)
+        for j, distance in enumerate(flood.distance)
+        if (i, j) not in flood.minima
+    )
 
 
 def _snaps(ring: GrippedRing, request: Request, last: float) -> tuple[Array, ...]:

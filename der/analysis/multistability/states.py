@@ -28,6 +28,7 @@ from der.errors import Reason
 from der.kernels.linking import vertices
 from der.kernels.quaternions import rotation
 from der.records.configurations import Shapes
+from der.records.record import SolveTime
 from der.records.states import States, Transition
 from der.rod.free_ring import FreeRing
 from der.rod.gripped_ring import GrippedRing, free_supports
@@ -85,7 +86,7 @@ def states(
         if run.done and not len(found):
             flat = _flat(full, scene.tolerance)
             run.stop(Reason.NO_START, f"no state was found from any start{flat}")
-    return replace(found, status=run.status, message=run.message, solve_s=run.seconds)
+    return replace(found, status=run.status, message=run.message, timing=SolveTime(run.seconds))
 
 
 def check(scene: Scene, gamma: float | None, count: int) -> None:
@@ -203,15 +204,15 @@ def record(scene: Scene, full: GrippedRing, search: Search, gamma: float | None)
         transitions.append((order.index(start), way))
     about = {**numerics(scene, full), "count": search.count}
     return States(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        about,
-        gamma,
-        tuple(described(full, *row) for row in rows),
-        tuple(way for _, way in sorted(transitions, key=lambda one: one[0])),
-        search.tried,
-        search.nowhere,
-        len(search.peaks),
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=about,
+        gamma=gamma,
+        states=tuple(described(full, *row) for row in rows),
+        transitions=tuple(way for _, way in sorted(transitions, key=lambda one: one[0])),
+        tried=search.tried,
+        nowhere=search.nowhere,
+        peaks=len(search.peaks),
         shapes=_shapes(full, known),
     )
 

@@ -24,6 +24,7 @@ from der.continuation.richardson import limit
 from der.errors import STOPPED
 from der.kernels.planar import Array, negative_planar
 from der.records.planar import FOLDED, PlanarState, PlanarStates
+from der.records.record import SolveTime
 from der.rod.planar_march import Lost, Solved, march, solved
 from der.rod.planar_ring import PlanarRing, covered, eight, planar_ring, shapes, shifted
 from der.scene import Scene, meshes, sector_name
@@ -85,14 +86,14 @@ def planar(scene: Scene, *, turns: int | None = None) -> PlanarStates:
     if not found and not pressed:
         status, message = "not converged", "no state was found from any start; use more edges"
     return PlanarStates(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        planar_numerics(scene),
-        named(rows),
-        status,
-        message,
-        time.perf_counter() - began,
-        shapes(mesh, [found[k].at.phi for k in kept]) if found else None,
+        status=status,
+        message=message,
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=planar_numerics(scene),
+        states=named(rows),
+        timing=SolveTime(time.perf_counter() - began),
+        shapes=shapes(mesh, [found[k].at.phi for k in kept]) if found else None,
     )
 
 

@@ -23,6 +23,7 @@ from der.continuation.richardson import limit
 from der.errors import STOPPED
 from der.kernels.planar import Array, PlanarRod
 from der.records.planar import Squeeze, SqueezePoint
+from der.records.record import SolveTime
 from der.rod.planar_march import Lost, Solved, Stop, kinds, march, solved
 from der.rod.planar_ring import PlanarRing, covered, planar_ring, shapes
 from der.scene import Scene
@@ -73,22 +74,21 @@ def squeeze(scene: Scene, distance: float = 0.0) -> Squeeze:
             status, message = "not converged", f"{lost} a between the points"
         found = _extrapolated(track, stops, goal, scene)
     special = [k for k, stop in enumerate(stops) if stop.kind]
+    column = dict(zip(("distance", "force", "energy"), found.values.T, strict=True))
     return Squeeze(
-        scene.ring.to_json(),
-        asdict(scene.section),
-        planar_numerics(scene),
-        found.values[:, 0],
-        found.values[:, 1],
-        found.values[:, 2],
-        tuple(stop.at.index for stop in stops),
-        found.errors[:, 1],
-        found.errors[:, 2],
-        tuple(_point(stops[k], found.values[k], found.errors[k]) for k in special),
-        goal,
-        status,
-        message,
-        time.perf_counter() - began,
-        shapes(track.mesh, [stop.at.phi[:-1] for stop in stops]) if stops else None,
+        status=status,
+        message=message,
+        ring=scene.ring.to_json(),
+        section=asdict(scene.section),
+        numerics=planar_numerics(scene),
+        goal=goal,
+        **column,
+        index=tuple(stop.at.index for stop in stops),
+        force_error=found.errors[:, 1],
+        energy_error=found.errors[:, 2],
+        points=tuple(_point(stops[k], found.values[k], found.errors[k]) for k in special),
+        timing=SolveTime(time.perf_counter() - began),
+        shapes=shapes(track.mesh, [stop.at.phi[:-1] for stop in stops]) if stops else None,
     )
 
 

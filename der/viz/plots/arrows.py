@@ -1,7 +1,7 @@
 """Arrows between points of a picture: bent around other points, apart from each other, labelled.
 
 All places are in pixels. An arrow is the parabola of matplotlib's `arc3`: its control point lies
-`rad` times the chord off the chord's middle.
+`bend` times the chord off the chord's middle.
 """
 
 from __future__ import annotations
@@ -11,20 +11,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from der.utils.checks import Array
 
 # bends that are tried, gentle ones first
 _BENDS = (0.1, -0.1, 0.16, -0.16, 0.22, -0.22, 0.29, -0.29, 0.37, -0.37, 0.46, -0.46, 0.6, -0.6)
-_FINE = 61  # points of an arrow that are looked at
+_FINE = np.linspace(0.0, 1.0, 61)  # points of an arrow that are looked at
 _SHARED = 3.0  # clearances around a common end in which arrows may come close
 _PLACES = np.linspace(0.14, 0.86, 37)  # of a label along its arrow
 _MIDDLE = 0.36  # where a label lies best: near the start, as ends are shared
+LETTERS = 6.8  # points: size of the letters of a label
 
 
-def arc(start: Array, end: Array, rad: float, t: Array) -> Array:
+def arc(start: Array, end: Array, bend: float, t: Array = _FINE) -> Array:
     """Points (k, 2) of an arrow at ``t`` (k,), from 0 at its start to 1."""
     chord = end - start
-    control = 0.5 * (start + end) + rad * np.array([chord[1], -chord[0]])
+    control = 0.5 * (start + end) + bend * np.array([chord[1], -chord[0]])
     t = t[:, None]
     found: Array = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * control + t**2 * end
     return found
@@ -33,7 +34,7 @@ def arc(start: Array, end: Array, rad: float, t: Array) -> Array:
 def bends(
     points: Array, pairs: Sequence[tuple[int, int]], clear: float, box: tuple[Array, Array]
 ) -> list[float]:
-    """The bend `rad` of each arrow, in the order of ``pairs``.
+    """The bend of each arrow, in the order of ``pairs``.
 
     Parameters
     ----------
@@ -42,73 +43,75 @@ def bends(
     clear : distance from an arrow to a point that is not its own, and to other arrows.
     box : lower left and upper right corner (2,): arrows stay inside.
     """
-    t = np.linspace(0.0, 1.0, _FINE)
     found = [0.0] * len(pairs)
     drawn: list[tuple[tuple[int, int], Array]] = []
     chords = [float(np.linalg.norm(points[b] - points[a])) for a, b in pairs]
     for k in sorted(range(len(pairs)), key=lambda k: (chords[k], pairs[k])):  # short ones are bound
         start, end = (points[i] for i in pairs[k])
         others = np.delete(points, pairs[k], axis=0)
-        least = np.inf
-        for rad in _BENDS:
-            way = arc(start, end, rad, t)
-            hits = np.maximum(0.0, 1.0 - _nearest(others, way) / clear).sum()
-            outside = np.any((way < box[0]) | (way > box[1]), axis=1).mean()
-            close = sum(_close(way, pairs[k], one, points, clear) for one in drawn)
-            cost = 100.0 * hits + 60.0 * outside + 30.0 * close + 10.0 * abs(rad)
-            if cost < least:
-                found[k], least = rad, cost
-        drawn.append((pairs[k], arc(start, end, found[k], t)))
+        costs = []
+        for bend in _BENDS:
+            curve = arc(start, end, bend)
+            hits = np.maximum(0.0, 1.0 - _nearest(others, curve) / clear).sum()
+            outside = np.any((curve < box[0]) | (curve > box[1]), axis=1).mean()
+            close = sum(_close(curve, pairs[k], one, points, clear) for one in drawn)
+            costs.append(100.0 * hits + 60.0 * outside + 30.0 * close + 10.0 * abs(bend))
+        found[k] = _BENDS[int(np.argmin(costs))]
+        drawn.append((pairs[k], arc(start, end, found[k])))
     return found
 
 
+def half_sizes(texts: Sequence[str], dpi: float) -> list[Array]:
+    """Half the width and the height (2,) of each label, in pixels."""
+    return [np.array([0.31 * len(text) + 0.2, 0.75]) * LETTERS * dpi / 72.0 for text in texts]
+
+
 def label_places(
-    points: Array, ways: Sequence[Array], half: Sequence[Array], clear: float
+    points: Array, arcs: Sequence[Array], half: Sequence[Array], clear: float
 ) -> list[Array]:
     """Where the middle of each arrow's label lies: on it, off points, other arrows and labels.
 
     Parameters
     ----------
-    ways : (k, 2) each, an arrow from its start to its end.
+    arcs : (k, 2) each, an arrow from its start to its end.
     half : (2,) each, half the width and the height of its label.
     clear : half the size of a point.
     """
     found: list[Array] = []
-    for k, way in enumerate(ways):
-        t = np.linspace(0.0, 1.0, len(way))
-        best, least = way[len(way) // 2], np.inf
-        for place in _PLACES:
-            at = np.array([np.interp(place, t, way[:, i]) for i in (0, 1)])
+    for k, curve in enumerate(arcs):
+        t = np.linspace(0.0, 1.0, len(curve))
+        spots = np.column_stack([np.interp(_PLACES, t, values) for values in curve.T])
+        costs = []
+        for place, at in zip(_PLACES, spots, strict=True):
             cost = 2.0 * abs(place - _MIDDLE)
             cost += 20.0 * np.sum(_within(points, at, half[k] + clear))
-            for i, other in enumerate(ways):
+            for i, other in enumerate(arcs):
                 if i != k:
                     cost += 5.0 * np.any(_within(other, at, half[k] + 2.0))
             for i, other in enumerate(found):
                 cost += 20.0 * np.sum(_within(other[None], at, half[k] + half[i] + 2.0))
-            if cost < least:
-                best, least = at, cost
-        found.append(best)
+            costs.append(cost)
+        found.append(spots[int(np.argmin(costs))])
     return found
 
 
-def _nearest(points: Array, way: Array) -> Array:
-    """Distance of each point from a way."""
-    found: Array = np.linalg.norm(points[:, None] - way, axis=2).min(axis=1)
+def _nearest(points: Array, curve: Array) -> Array:
+    """Distance of each point from a curve."""
+    found: Array = np.linalg.norm(points[:, None] - curve, axis=2).min(axis=1)
     return found
 
 
 def _close(
-    way: Array,
+    curve: Array,
     pair: tuple[int, int],
     drawn: tuple[tuple[int, int], Array],
     points: Array,
     clear: float,
 ) -> float:
-    """Share of a way that runs along another one, the surroundings of common ends left out."""
-    apart = _nearest(way, drawn[1]) < 0.5 * clear
+    """Share of a curve that runs along another one, the surroundings of common ends left out."""
+    apart = _nearest(curve, drawn[1]) < 0.5 * clear
     for i in set(pair) & set(drawn[0]):
-        apart &= np.linalg.norm(way - points[i], axis=1) > _SHARED * clear
+        apart &= np.linalg.norm(curve - points[i], axis=1) > _SHARED * clear
     return float(apart.mean())
 
 

@@ -1,4 +1,4 @@
-"""Energy over twist and grip distance as a picture: contours, and the surface in perspective."""
+"""Energy over twist and distance of the grips: contours, and the surface in perspective."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from der.records.energy_surface import Surface
 from der.utils.checks import Array
-from der.viz.plots.style import INK, QUIET, TITLE, UNSTABLE, blank, dress, legend_below, mark, title
+from der.viz.palette import INK, QUIET, UNSTABLE
+from der.viz.plots.style import GAMMA, MARKS, blank, entry, label_axes, legend_below, mark
+from der.viz.titles import title
 
 YELLOW = "#F0E442"
 LEVELS = 28  # of a filled contour
 CEILING = 1.35  # of the path's largest energy: what lies above is one colour
+COLOURS = "YlGnBu_r"
 
 
-def figure_of_surface(surface: Surface) -> Figure:
+def draw(surface: Surface) -> Figure:
     """Contours of the least energy over twist and grip distance, and the surface in perspective.
 
     Raises
@@ -34,116 +37,106 @@ def figure_of_surface(surface: Surface) -> Figure:
     """
     if not np.any(np.isfinite(surface.energy)):
         raise ValueError("surface must have a minimum in some cell to be plotted, got none")
-    figure = blank((10.4, 4.7))
-    figure.text(0.5, 0.965, title(surface.ring, surface.section, surface.numerics), **TITLE)
-    panel = figure.add_axes((0.06, 0.175, 0.42, 0.74))
-    x, y = surface.gamma / math.pi, surface.distance
-    ceiling = CEILING * float(np.nanmax(surface.path[2]))
+    figure = blank(10.4, 4.7, title(surface))
+    ceiling = CEILING * float(np.nanmax(surface.path[:, 2]))
     norm = PowerNorm(0.7, 0.0, ceiling)
-    values = np.ma.masked_invalid(np.minimum(surface.energy, 2.0 * ceiling)).T
-    levels = ceiling * np.linspace(0.0, 1.0, LEVELS) ** 1.4
-    filled = panel.contourf(x, y, values, levels, cmap="YlGnBu_r", norm=norm, extend="max")
-    panel.contour(x, y, values, levels, colors=INK, linewidths=0.35, alpha=0.35)
-    handles = [*_several(panel, surface), *_overlay(panel, surface)]
-    dress(panel, "distance of the grips  $d/a$")
-    panel.margins(0.0)
-    panel.set_xlim(float(x[0]), float(x[-1]))
-    panel.set_ylim(float(y[0]), float(y[-1]))
-    panel.set_xlabel("rotation of a grip  $\\gamma/\\pi$", fontsize=9, color=INK)
+    axes = figure.add_axes((0.06, 0.175, 0.42, 0.74))
+    filled = _contours(axes, surface, norm)
+    handles = [*_hatches(axes, surface), *_overlay(axes, surface)]
+    label_axes(axes, GAMMA, "distance of the grips  $d/a$")
+    axes.margins(0.0)
+    axes.set_xlim(surface.gamma[0] / math.pi, surface.gamma[-1] / math.pi)
+    axes.set_ylim(float(surface.distance[0]), float(surface.distance[-1]))
     bar = figure.colorbar(filled, cax=figure.add_axes((0.492, 0.175, 0.011, 0.74)))
     bar.set_label("least energy  $U\\,a/GJ$", fontsize=8.5, color=INK)
     bar.locator = FixedLocator(MaxNLocator(7).tick_values(0.0, 0.97 * ceiling)[:-1])
     bar.update_ticks()
     bar.ax.tick_params(labelsize=7.5, color=QUIET, labelcolor=INK)
     bar.outline.set_visible(False)
-    _relief(figure, surface, ceiling, norm)
+    _relief(figure, surface, norm)
     legend_below(figure, handles)
     return figure
 
 
-def _several(panel: Axes, surface: Surface) -> Iterator[Patch]:
-    """Hatching over cells with several minima, and dots over those with a way down aside."""
+def _contours(axes: Axes, surface: Surface, norm: PowerNorm) -> Any:
+    """Filled contours of the least energy up to the ceiling."""
+    x, y, ceiling = surface.gamma / math.pi, surface.distance, float(norm.vmax or 1.0)
+    values = np.ma.masked_invalid(np.minimum(surface.energy, 2.0 * ceiling)).T
+    levels = ceiling * np.linspace(0.0, 1.0, LEVELS) ** 1.4
+    axes.contour(x, y, values, levels, colors=INK, linewidths=0.35, alpha=0.35)
+    return axes.contourf(x, y, values, levels, cmap=COLOURS, norm=norm, extend="max")
+
+
+def _hatches(axes: Axes, surface: Surface) -> Iterator[Patch]:
+    """Hatching over cells with several minima, and dots over those of index above 0."""
     x, y = surface.gamma / math.pi, surface.distance
     for chosen, hatch, label in (
         (surface.count > 1, "////", "several minima"),
-        (surface.index > 0, "....", "a lower one without symmetry"),
+        (surface.index > 0, "....", "unstable to modes without the symmetry"),
     ):
         if np.any(chosen):
-            shade = panel.contourf(
+            shade = axes.contourf(
                 x, y, chosen.T.astype(float), (0.5, 1.5), colors="none", hatches=(hatch,)
             )
             shade.set(edgecolor=(0.13, 0.13, 0.13, 0.35), linewidth=0.0)
-            yield Patch(
-                facecolor="#d9ecd0", edgecolor=QUIET, linewidth=0.0, hatch=hatch, label=label
-            )
+            look: dict[str, Any] = {"facecolor": "#d9ecd0", "edgecolor": QUIET, "linewidth": 0.0}
+            yield Patch(hatch=hatch, label=label, **look)
 
 
-def _overlay(panel: Axes, surface: Surface) -> Iterator[Line2D]:
-    """The path of twisting with its folds and rests, and snaps."""
+def _overlay(axes: Axes, surface: Surface) -> Iterator[Line2D]:
+    """The path of twisting with its folds and M = 0 states, and snaps."""
     line: dict[str, Any] = {"color": INK, "linewidth": 1.5}
     edge = [withStroke(linewidth=2.8, foreground="white")]
-    turn, away, _ = surface.path
-    panel.plot(turn / math.pi, away, path_effects=edge, zorder=3, **line)
-    yield Line2D([], [], label="path of twisting", **line)
+    turn, away, _ = surface.path.T
+    axes.plot(turn / math.pi, away, path_effects=edge, zorder=3, **line)
+    yield entry("path of twisting", **line)
+    snap: dict[str, Any] = {"color": UNSTABLE, "linewidth": 1.4}
     for one in surface.snaps:
-        panel.plot(one[:, 0] / math.pi, one[:, 1], color=UNSTABLE, linewidth=1.4, zorder=4)
-        panel.annotate(
-            "",
-            (one[-1, 0] / math.pi, one[-1, 1]),
-            xytext=(one[0, 0] / math.pi, one[0, 1]),
-            arrowprops={"arrowstyle": "-|>", "color": UNSTABLE, "linewidth": 1.4},
-            zorder=4,
-        )
+        x, y = one[:, 0] / math.pi, one[:, 1]
+        axes.plot(x, y, zorder=4, **snap)
+        arrow = {"arrowstyle": "-|>", **snap}
+        axes.annotate("", (x[-1], y[-1]), xytext=(x[0], y[0]), arrowprops=arrow, zorder=4)
     if surface.snaps:
-        yield Line2D([], [], color=UNSTABLE, linewidth=1.4, marker=">", markersize=4, label="snap")
-    for places, label, marker, face in (
-        (surface.folds, "fold", "D", "white"),
-        (surface.rests, "$M = 0$", "o", YELLOW),
+        yield entry("snap", marker=">", markersize=4, **snap)
+    for places, label, look in (
+        (surface.folds, "fold", mark(*MARKS["fold"])),
+        (surface.rests, "$M = 0$", mark("o", 5.0, YELLOW)),
     ):
         if len(places):
-            look = mark(marker, 5.0, face)
-            panel.plot(places[:, 0] / math.pi, places[:, 1], zorder=5, clip_on=False, **look)
-            yield Line2D([], [], label=label, **look)
+            axes.plot(places[:, 0] / math.pi, places[:, 1], zorder=5, clip_on=False, **look)
+            yield entry(label, **look)
 
 
-def _relief(figure: Figure, surface: Surface, ceiling: float, norm: PowerNorm) -> None:
-    """The surface in perspective, cut off at the ceiling, with the path on it."""
-    panel: Any = figure.add_axes((0.6, 0.09, 0.4, 0.9), projection="3d")
+def _relief(figure: Figure, surface: Surface, norm: PowerNorm) -> None:
+    """The surface in perspective, cut off at the ceiling, with the path and snaps on it."""
+    axes: Any = figure.add_axes((0.6, 0.09, 0.4, 0.9), projection="3d")
     x, y, height = _finer(surface)
-    panel.plot_surface(
-        x,
-        y,
-        np.where(height <= ceiling, height, np.nan),
-        cmap="YlGnBu_r",
-        norm=norm,
-        rcount=len(x),
-        ccount=len(y),
-        linewidth=0.0,
-        antialiased=False,
-        alpha=0.9,
-    )
-    turn, away, energy = surface.path
+    ceiling = float(norm.vmax or 1.0)
+    fine: dict[str, Any] = {"rcount": len(x), "ccount": len(y), "linewidth": 0.0}
+    visible = np.where(height <= ceiling, height, np.nan)
+    axes.plot_surface(x, y, visible, cmap=COLOURS, norm=norm, antialiased=False, alpha=0.9, **fine)
+    turn, away, energy = surface.path.T
     shown = (turn >= surface.gamma[0]) & (turn <= surface.gamma[-1])
-    along = np.where(shown, energy, np.nan)
-    panel.plot(turn / math.pi, away, along + 0.01 * ceiling, color=INK, linewidth=1.6, zorder=10)
-    for one in surface.snaps:
-        over = one[:, 2] + 0.01 * ceiling
-        panel.plot(one[:, 0] / math.pi, one[:, 1], over, color=UNSTABLE, linewidth=1.5, zorder=11)
-    panel.set_zlim(0.0, ceiling)
-    panel.view_init(elev=27.0, azim=-128.0)
-    panel.zaxis.set_rotate_label(False)
-    panel.set_box_aspect((1.25, 1.0, 0.8), zoom=0.95)
-    for axis, label in (
-        (panel.xaxis, "$\\gamma/\\pi$"),
-        (panel.yaxis, "$d/a$"),
-        (panel.zaxis, "$U\\,a/GJ$"),
+    lines = [(turn, away, np.where(shown, energy, np.nan), INK)]
+    lines += [(*one.T, UNSTABLE) for one in surface.snaps]
+    for k, (gamma, distance, along, colour) in enumerate(lines):
+        over = along + 0.01 * ceiling
+        axes.plot(gamma / math.pi, distance, over, color=colour, linewidth=1.5, zorder=10 + k)
+    axes.set_zlim(0.0, ceiling)
+    axes.view_init(elev=27.0, azim=-128.0)
+    axes.zaxis.set_rotate_label(False)
+    axes.set_box_aspect((1.25, 1.0, 0.8), zoom=0.95)
+    for axis, label in zip(
+        (axes.xaxis, axes.yaxis, axes.zaxis),
+        ("$\\gamma/\\pi$", "$d/a$", "$U\\,a/GJ$"),
+        strict=True,
     ):
         axis.set_label_text(label, fontsize=8.5, color=INK)
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.line.set_color(QUIET)
         axis._axinfo["grid"].update(color="#e2e2e2", linewidth=0.5)
         axis.set_major_locator(MaxNLocator(5))
-    panel.tick_params(labelsize=7, pad=0, color=QUIET, labelcolor=INK)
+    axes.tick_params(labelsize=7, pad=0, color=QUIET, labelcolor=INK)
 
 
 def _finer(surface: Surface) -> tuple[Array, Array, Array]:
@@ -155,3 +148,6 @@ def _finer(surface: Surface) -> tuple[Array, Array, Array]:
     gamma, distance = np.meshgrid(*finer, indexing="ij")
     height = RegularGridInterpolator(axes, surface.energy)((gamma, distance))
     return gamma / math.pi, distance, height
+
+
+figure_of_surface = draw  # until callers are moved

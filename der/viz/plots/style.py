@@ -1,9 +1,12 @@
-"""What pictures of the engine's answers share: colours, title, axes, and how a ring is seen."""
+"""The style of all still pictures: figures, axes, marks, texts, legends, and saving.
+
+Figures belong to nobody: nothing global changes, and no display is needed.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path as File
 from typing import Any
 
@@ -11,118 +14,81 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
+from der.records.path import Path
 from der.utils.checks import Array
 from der.utils.files import FilePath, write_whole
+from der.viz.curve import stretches
+from der.viz.palette import INK, QUIET, STRETCHES
 
 FORMATS = (".png", ".pdf", ".svg")
 DPI = 150
-INK, QUIET = "#222222", "#8a8a8a"
-STABLE, UNSTABLE, FREE = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito
-DASHES = (0, (3.5, 1.6))  # of what is unstable
-UNITS = {"vertex_angle": "°"}
-BAR = "   |   "  # between the parts of a title
-ACROSS = 200  # points along a ring
+GAMMA, MOMENT, ENERGY = (
+    "rotation of a grip  $\\gamma/\\pi$",
+    "moment  $M\\,a/GJ$",
+    "energy  $U\\,a/GJ$",
+)
+HALO = [withStroke(linewidth=2.5, foreground="white")]
+MARKS = {  # marker and size of special points, by their kind
+    "fold": ("D", 4.6),
+    "limit": ("^", 5.6),
+    "branch": ("s", 4.8),
+    "snap": ("*", 8.0),
+    "contact": ("x", 4.6),
+}
 
 
-def save_figure(figure: Figure, file: FilePath) -> None:
-    """Write a figure, whole or not at all, in the format of the file's suffix.
+def save(figure: Figure, file: FilePath) -> None:
+    """Write a figure atomically, in the format of the file's suffix.
 
     Raises
     ------
     ValueError
-        If the suffix is not one of FORMATS or the place cannot be written to.
+        If the suffix is not one of FORMATS or the file cannot be written.
     """
     suffix = File(file).suffix.lower()
     if suffix not in FORMATS:
         raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
+    # the version of matplotlib in it would make the same picture another file
+    metadata: dict[str, Any] = {"Software": None} if suffix == ".png" else {}
     try:
-        write_whole(file, lambda opened: figure.savefig(opened, format=suffix[1:]))
+        write_whole(
+            file, lambda opened: figure.savefig(opened, format=suffix[1:], metadata=metadata)
+        )
     except OSError as problem:
         reason = problem.strerror or problem
         raise ValueError(f"plot {str(file)!r} cannot be written: {reason}") from problem
 
 
-def seen(x: Array, points: Array | None = None) -> Array:
-    """Smooth closed curve (n, 3) through vertices: to the right, up and towards the reader.
-
-    The ring is seen from 40 degrees off the normal of the plane to which it is closest. With
-    ``points`` (k, 3), these as they are seen, instead.
-    """
-    from scipy.interpolate import CubicSpline
-
-    n = len(x)
-    curve = CubicSpline(np.arange(n + 1), np.append(x, x[:1], axis=0), bc_type="periodic")
-    fine = curve(np.linspace(0.0, n, ACROSS + 1))
-    centre = fine.mean(axis=0)
-    right, up, towards = np.linalg.svd(fine - centre, full_matrices=False)[2]
-    tilt = math.radians(40.0)
-    seen_up = math.cos(tilt) * up + math.sin(tilt) * towards
-    seen_towards = -math.sin(tilt) * up + math.cos(tilt) * towards
-    shown = fine if points is None else points
-    return np.asarray((shown - centre) @ np.stack([right, seen_up, seen_towards], axis=1))
-
-
-TITLE: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9.5, "color": INK}
-
-
-def blank(size: tuple[float, float]) -> Figure:
-    """A figure without a display."""
-    figure = Figure(figsize=size, dpi=DPI, facecolor="white")
+def blank(width: float, height: float, title: str, *, dpi: int = DPI) -> Figure:
+    """An empty figure, inches, with a title along its upper edge."""
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
+    text = figure.text(0.5, 1.0 - 0.17 / height, title, fontsize=9.5, color=INK)
+    text.set(ha="center", va="center")
+    widest = 0.97 * figure.bbox.width / text.get_window_extent().width
+    text.set_fontsize(9.5 * min(1.0, widest))
     return figure
 
 
-def title(
-    ring: Mapping[str, object], section: Mapping[str, object], numerics: Mapping[str, object]
-) -> str:
-    """Ring, section and mesh in one line."""
-    edges = f"{numerics.get('n_edges')} edges"
-    edges = f"extrapolated from {edges}" if numerics.get("error_bars") else edges
-    return BAR.join([*about(ring, section), edges])
+def label_axes(axes: Axes, across: str, up: str, *, fontsize: float = 9.0) -> None:
+    """Put labels on axes and give them the look of all pictures."""
+    axes.set_xlabel(across, fontsize=fontsize, color=INK)
+    axes.set_ylabel(up, fontsize=fontsize, color=INK)
+    axes.tick_params(labelsize=fontsize - 1.0, color=QUIET, labelcolor=INK, direction="in")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(QUIET)
 
 
-def about(ring: Mapping[str, object], section: Mapping[str, object]) -> list[str]:
-    """Words for a ring and words for its section."""
-    parts = [of_ring(ring)]
-    if section.get("h_over_t") is not None:
-        parts.append(f"h/t = {section['h_over_t']:g}")
-    elif section:
-        parts.append(rf"$\alpha$ = {section['alpha']:.4g}, $\beta$ = {section['beta']:.4g}")
-    return parts
-
-
-def of_ring(ring: Mapping[str, object]) -> str:
-    """Words for a ring."""
-    words = [str(ring["shape"])]
-    words += [
-        f"{name.replace('_over_', '/').replace('_', ' ')} = {value:g}{UNITS.get(name, '')}"
-        for name, value in ring.items()
-        if isinstance(value, float) and (name, value) != ("natural_curvature", 1.0)
-    ]
-    if ring.get("twist_axis") == "y":
-        words.append("about y")
-    return ", ".join(words)
-
-
-def sure(value: float, error: float) -> str:
-    """An extrapolated value with its error, both to the second digit of the error."""
-    if not error > 0.0:
-        return f"{value:.6g}"
-    places = min(max(1 - math.floor(math.log10(error)), 0), 12)
-    return f"{value:.{places}f} ± {error:.{places}f}"
-
-
-def dress(panel: Axes, label: str) -> None:
-    """Axes as all pictures have them, with the name of what goes up."""
-    panel.set_ylabel(label, fontsize=9, color=INK)
-    panel.tick_params(labelsize=8, color=QUIET, labelcolor=INK, direction="in")
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.spines[["left", "bottom"]].set_color(QUIET)
+def zero_line(axes: Axes) -> None:
+    """A thin line at zero."""
+    axes.axhline(0.0, color=QUIET, linewidth=0.6, zorder=0)
 
 
 def mark(marker: str, size: float, face: str = "white") -> dict[str, Any]:
-    """How a special state is drawn."""
+    """How a special state is marked."""
     return {
         "linestyle": "none",
         "marker": marker,
@@ -133,10 +99,57 @@ def mark(marker: str, size: float, face: str = "white") -> dict[str, Any]:
     }
 
 
+def entry(label: str, **look: Any) -> Line2D:
+    """An entry of a legend."""
+    return Line2D([], [], label=label, **look)
+
+
+def draw_stretches(axes: Axes, path: Path, height: Array, colour: str | None = None) -> None:
+    """Draw a path's curve over gamma/pi by its stability; in one colour if that is given."""
+    for kind, points in stretches(path, height):
+        look = STRETCHES[kind]
+        axes.plot(
+            *points.T, color=colour or look.colour, linestyle=look.style, linewidth=1.6, zorder=2
+        )
+
+
+def stretch_entries(*paths: Path) -> Iterator[Line2D]:
+    """Entries of a legend for the kinds of stretches that paths have."""
+    kinds = {kind for path in paths for kind, _ in stretches(path, path.energy)}
+    for kind, look in STRETCHES.items():
+        if kind in kinds:
+            yield entry(look.label, color=look.colour, linestyle=look.style, linewidth=1.6)
+
+
+def say(
+    axes: Axes, place: Sequence[float], text: str, away: Sequence[float] = (0.0, 0.0), **look: Any
+) -> None:
+    """Write a text ``away`` (points) from a place of the axes, with a white halo."""
+    base: dict[str, Any] = {"fontsize": 8.5, "color": INK, "va": "center", "zorder": 6}
+    base |= {"path_effects": HALO, "textcoords": "offset points"}
+    axes.annotate(text, (place[0], place[1]), (away[0], away[1]), **(base | look))
+
+
+def place_letters(axes: Axes, letters: str, places: Array, curve: Array) -> None:
+    """Mark places (n, 2) on a curve (m, 2) by dots, with letters where there is most room."""
+    axes.autoscale_view()
+    to_pixels = axes.transData.transform
+    obstacles = to_pixels(curve)
+    low, high = axes.get_window_extent().get_points()
+    turn = np.arange(16) * math.pi / 8
+    offsets = 9.5 * np.column_stack([np.cos(turn), np.sin(turn)])  # points
+    for letter, here in zip(letters, places, strict=False):
+        spots = to_pixels(here) + offsets * DPI / 72
+        room = np.linalg.norm(spots[:, None] - obstacles, axis=2).min(axis=1)
+        room[np.any((spots < low + 8) | (spots > high - 8), axis=1)] = -1
+        best = int(np.argmax(room))
+        axes.plot(*here, "o", color=INK, markersize=3.6, zorder=3)
+        say(axes, here, letter, offsets[best], ha="center", fontweight="bold", zorder=5)
+        obstacles = np.append(obstacles, spots[best : best + 1], axis=0)
+
+
 def legend_below(figure: Figure, handles: Sequence[Any], *, fontsize: float = 8.0) -> None:
     """A legend along the lower edge, in as many columns as there is width for."""
-    if not handles:
-        return
     for columns in range(len(handles), 0, -1):
         legend = figure.legend(
             handles=list(handles),
@@ -155,3 +168,6 @@ def legend_below(figure: Figure, handles: Sequence[Any], *, fontsize: float = 8.
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()
+
+
+save_figure = save  # until callers are moved

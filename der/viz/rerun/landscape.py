@@ -127,12 +127,12 @@ class Box:
 
 def send_surface(reel: Reel, surface: Surface) -> None:
     """The least energy as a surface, coloured by it; the path, folds, rests, snaps; and now."""
-    ceiling = CEILING * float(np.nanmax(surface.path[2]))
+    ceiling = CEILING * float(np.nanmax(surface.path[:, 2]))
     ends = [(float(v[0]), float(v[-1])) for v in (surface.gamma, surface.distance)]
     box = Box(ends[0], ends[1], ceiling)
     _send_relief(reel, surface, box)
     lift = 0.012 * ceiling  # lines lie on the surface, not in it
-    turn, away, energy = surface.path
+    turn, away, energy = surface.path.T
     shown = (turn >= ends[0][0]) & (turn <= ends[0][1])
     line = box.place(turn, away, energy + lift)[shown]
     reel.still("surface/path", rr.LineStrips3D([line], colors=INK, radii=0.011))

@@ -1,7 +1,7 @@
-"""What the first command after an installation waits for: compile times by kernel.
+"""Start of commands: wall times, and what the first one after an installation compiles.
 
-A fresh process folds a ring with an empty cache of kernels. Numba tells of every compilation as it
-starts and ends; those inside another one are taken off its time.
+A fresh process folds a ring with an empty cache of kernels. Numba reports the start and the end of
+every compilation; those inside another one are subtracted from its time.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import runpy
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -17,6 +18,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from validation.benchmark.extent import Extent
 from validation.benchmark.rows import Row
 
 COMMAND = ("fold", "circle", "--h-over-t", "4", "--quiet")
@@ -24,14 +26,14 @@ COSTLIEST = 10  # kernels that have a row of their own
 
 
 class Compiled(NamedTuple):
-    """What compiling a kernel has taken, without those that it calls."""
+    """The time of compiling a kernel, without those that it calls."""
 
     kernel: str
     signatures: int
     seconds: float
 
 
-class Told(NamedTuple):
+class Report(NamedTuple):
     """A compilation starts, or ends."""
 
     kernel: str
@@ -39,47 +41,61 @@ class Told(NamedTuple):
     starts: bool
 
 
-def rows(command: tuple[str, ...] = COMMAND) -> Iterator[Row]:
+def rows(extent: Extent) -> Iterator[Row]:
+    """Compiled commands, and where asked for the first command of all."""
+    yield from compiled(extent.commands)
+    if extent.cold:
+        yield from compiling()
+
+
+def compiled(repeats: int) -> Iterator[Row]:
+    """Wall time of complete commands, compiled before."""
+    for words, goal in ((("--help",), 0.5), (COMMAND, 3.0)):
+        times = [_wall("der", *words) for _ in range(repeats)]
+        yield Row("start-up", " ".join(("der", *words)), statistics.median(times), "s", goal)
+
+
+def compiling(command: tuple[str, ...] = COMMAND) -> Iterator[Row]:
     """The first command, the next one, the kernels compiled and what they leave on disk."""
     with tempfile.TemporaryDirectory() as folder:
         cache, out = Path(folder, "cache"), Path(folder, "compiled.json")
-        first = _command(command, cache, out)
+        words = ("validation.benchmark.start", str(out), *command)
+        first = _wall(*words, cache=cache)
         kernels = [Compiled(*one) for one in json.loads(out.read_text())]
-        again = _command(command, cache, out)
+        again = _wall(*words, cache=cache)
         kept = [file for file in cache.rglob("*") if file.is_file()]
         size = 1e-6 * sum(file.stat().st_size for file in kept)
     yield Row("start-up", "first der fold, compiling, wall", first, "s", 60.0)
     yield Row("start-up", "the next, loading, wall", again, "s", 3.0)
     note = f"{sum(k.signatures for k in kernels)} signatures"
-    yield Row("start-up", "kernels compiled", len(kernels), "", None, note)
-    yield Row("start-up", "kernels kept on disk", size, "MB", None, f"{len(kept)} files")
+    yield Row("start-up", "kernels compiled", len(kernels), "", note=note)
+    yield Row("start-up", "kernels kept on disk", size, "MB", note=f"{len(kept)} files")
     for one in kernels[:COSTLIEST]:
         yield Row("start-up", f"compiling {one.kernel}", one.seconds, "s")
 
 
-def _command(command: tuple[str, ...], cache: Path, out: Path) -> float:
-    """Wall time of the command in a process of its own, which writes ``out`` [s]."""
-    words = [sys.executable, "-m", "validation.benchmark.cold", str(out), *command]
-    env = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+def _wall(*module: str, cache: Path | None = None) -> float:
+    """Wall time of a module in a process of its own [s]."""
+    env = os.environ if cache is None else os.environ | {"NUMBA_CACHE_DIR": str(cache)}
     start = time.perf_counter()
-    subprocess.run(words, check=True, capture_output=True, env=env)
+    subprocess.run([sys.executable, "-m", *module], check=True, capture_output=True, env=env)
     return time.perf_counter() - start
 
 
-def own_times(told: Iterable[Told]) -> list[Compiled]:
+def own_times(reports: Iterable[Report]) -> list[Compiled]:
     """Time of each kernel without what it calls, the costliest first."""
     found: dict[str, Compiled] = {}
     open_: list[tuple[float, float]] = []  # start, and what was compiled meanwhile
-    for one in told:
+    for one in reports:
         if one.starts:
             open_.append((one.time, 0.0))
             continue
         start, inside = open_.pop()
-        whole = one.time - start
+        taken = one.time - start
         if open_:
-            open_[-1] = open_[-1][0], open_[-1][1] + whole
+            open_[-1] = open_[-1][0], open_[-1][1] + taken
         _, signatures, seconds = found.get(one.kernel, Compiled(one.kernel, 0, 0.0))
-        found[one.kernel] = Compiled(one.kernel, signatures + 1, seconds + whole - inside)
+        found[one.kernel] = Compiled(one.kernel, signatures + 1, seconds + taken - inside)
     return sorted(found.values(), key=lambda one: -one.seconds)
 
 
@@ -95,12 +111,11 @@ def _watched(out: Path, command: list[str]) -> None:
     except SystemExit as ended:
         if ended.code:
             raise
-    told = []
+    reports = []
     for moment, one in recorder.buffer:
         kernel = one.data["dispatcher"].py_func
-        name = f"{kernel.__module__}.{kernel.__qualname__}"
-        told.append(Told(name, moment, one.is_start))
-    out.write_text(json.dumps(own_times(told)))
+        reports.append(Report(f"{kernel.__module__}.{kernel.__qualname__}", moment, one.is_start))
+    out.write_text(json.dumps(own_times(reports)))
 
 
 if __name__ == "__main__":

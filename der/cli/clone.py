@@ -1,0 +1,74 @@
+"""Commands that run the evidence of a clone: `bench` and `stress`.
+
+The wheel has no evidence in it. In a clone these commands do what `python -m validation` does.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path as File
+from typing import Annotated, Any
+
+import typer
+
+from der.cli.parsing import integer_option
+
+_CLONE = ("der/__init__.py", "validation/__main__.py", "validation/benchmark/run.py")
+
+
+@dataclass(frozen=True)
+class BenchOptions:
+    """What is measured, and where it is written."""
+
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write what is measured.")] = None
+    out: Annotated[
+        str | None,
+        typer.Option(metavar="DIR", help="Write bench.json, bench_error.png and bench_cost.png."),
+    ] = None
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions and sizes.")] = False
+    only: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PARTS",
+            help="Of paths, needs, orders, error, state, scaling, sweep, start; commas between.",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class StressOptions:
+    """Which cases are tried."""
+
+    quick: Annotated[bool, typer.Option("--quick", help="120 cases, under a minute.")] = False
+    long: Annotated[bool, typer.Option("--long", help="10,000 cases, ten minutes on 2 cores.")] = (
+        False
+    )
+    workers: Annotated[
+        int | None, integer_option("Processes; with --long one a core, else one.")
+    ] = None
+    seed: Annotated[int, integer_option("Of the cases.")] = 0
+    json: Annotated[str | None, typer.Option(metavar="F", help="Write the summary here.")] = None
+
+
+def bench(wanted: BenchOptions) -> int:
+    """Measure time, memory and error of this package and its peers, on this machine, in one run."""
+    return int(_validation("bench").benchmark(wanted))
+
+
+def stress(wanted: StressOptions) -> int:
+    """Try to break both solvers, and count what has no named reason."""
+    return int(_validation("stress").stress(wanted))
+
+
+def _validation(name: str) -> Any:
+    """The module behind `python -m validation` of the clone that is the current folder."""
+    if not all(File(file).is_file() for file in _CLONE):
+        raise typer.TyperException(
+            f"'{name}' runs in a clone of the repository of der only: clone it, change into its "
+            f"folder, and repeat the command"
+        )
+    sys.path.insert(0, os.getcwd())
+    return import_module("validation.__main__")

@@ -1,0 +1,135 @@
+"""Commands that draw what the paper shows: `figure`, and `phase` for phase diagrams."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path as File
+from typing import Annotated
+
+import typer
+
+from der.cli.files import check_named, folder_option
+from der.cli.options import NU
+from der.cli.output import say, show
+from der.cli.parsing import integer_option, number_option, options_named
+
+PHASES = {  # the diagrams of each shape, that of a cube last
+    "ellipse": ("fig3a",),
+    "rectangle": ("fig5b", "fig5c", "fig5a"),
+    "triangle": ("fig8b", "fig8c", "fig8a"),
+    "circle": ("circle",),
+}
+
+
+@dataclass(frozen=True)
+class FigureOptions:
+    """Which figures, and where they go."""
+
+    names: Annotated[
+        list[str],
+        typer.Argument(metavar="NAME...", help="fig2b, fig3b, ..., hysteresis; all; or diagrams."),
+    ]
+    out: Annotated[str, folder_option("The folder to write to.")]
+    workers: Annotated[int | None, integer_option("Processes; one a core if not given.")] = None
+
+
+def figure(wanted: FigureOptions) -> int:
+    """Draw the paper's figures: PNG, and the data as CSV. Diagrams are the phase diagrams."""
+    with options_named():
+        check_named(out=wanted.out)
+        from der.paper import DIAGRAMS, FIGURES, Interrupted, draw
+
+        several = {"all": list(FIGURES), "diagrams": list(DIAGRAMS)}
+        names = several.get(" ".join(wanted.names), wanted.names)
+        try:
+            drawn = draw(names, wanted.out, workers=wanted.workers, warn=_warn)
+        except Interrupted as stopped:
+            drawn, code = stopped.drawn, 130
+        else:
+            code = 3 if drawn.failed else 0
+    for files in drawn.written.values():
+        for file in files:
+            show(str(file))
+    for name, reason in drawn.failed.items():
+        say(f"der: {name} failed: {reason}")
+    return code
+
+
+@dataclass(frozen=True)
+class PhaseOptions:
+    """Which diagrams, of which cases, and where they go."""
+
+    shape: Annotated[
+        str,
+        typer.Argument(
+            metavar="SHAPE", help="ellipse, rectangle, triangle, circle; or a diagram: fig3a, ..."
+        ),
+    ]
+    out: Annotated[str, folder_option("The folder to write to.")]
+    workers: Annotated[int | None, integer_option("Processes; one a core if not given.")] = None
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, instead.")
+    ] = None
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the cases that the folder has.")
+    ] = False
+    nu: Annotated[float, number_option("Poisson's ratio.")] = NU
+    span: Annotated[
+        list[str] | None,
+        typer.Option("--range", metavar="NAME=A:B", help="Of a parameter, such as b_over_a=0.7:1."),
+    ] = None
+    finest: Annotated[int | None, integer_option("Finest cells along a side, a power of two.")] = (
+        None
+    )
+    check: Annotated[
+        str | None, typer.Option(help="'der': ask the rod about a sample of the cases.")
+    ] = None
+    sample: Annotated[int, integer_option("Cases that --check asks about.")] = 40
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="No progress and no summary; warnings.")
+    ] = False
+
+
+def phase(wanted: PhaseOptions) -> int:
+    """Map how rings fold over profile and cross-section: cases, sharp boundaries, a picture."""
+    with options_named():
+        check_named(out=wanted.out)
+        from der.diagram.diagram import FAMILIES
+
+        shape = wanted.shape
+        chosen = PHASES.get(shape, (shape,) if shape in FAMILIES else ())
+        if not chosen:
+            words = ", ".join(dict.fromkeys([*PHASES, *FAMILIES]))
+            raise typer.TyperException(f"SHAPE must be one of {words}, got {shape!r}")
+        if wanted.check not in (None, "der"):
+            raise ValueError(f"check must be 'der', got {wanted.check!r}")
+        for name in chosen:
+            text = _diagram(wanted, name, File(wanted.out) / (name if len(chosen) > 1 else ""))
+            if not wanted.quiet:
+                show(text)
+    return 0
+
+
+def _diagram(wanted: PhaseOptions, name: str, folder: File) -> str:
+    """Make one diagram, and return its summary."""
+    from der.analysis.fold import fold
+    from der.diagram.diagram import run_phase
+
+    return run_phase(
+        name,
+        folder,
+        workers=wanted.workers,
+        scheduler=wanted.scheduler,
+        resume=wanted.resume,
+        nu=wanted.nu,
+        ranges=tuple(wanted.span or ()),
+        check=fold if wanted.check else None,
+        sample=wanted.sample,
+        finest=wanted.finest,
+        quiet=wanted.quiet,
+        warn=_warn,
+    )
+
+
+def _warn(words: str) -> None:
+    say(f"der: {words}")

@@ -1,0 +1,238 @@
+"""Options for files, and the files themselves, checked before the work begins.
+
+Every command has its own set of these options; `targets` turns any of them into files by option.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
+
+from der.cli.output import OUTPUT, Targets
+
+if TYPE_CHECKING:
+    from der.records.path import Path
+
+
+def folder_option(text: str) -> Any:
+    """An option that takes a folder."""
+    return typer.Option(metavar="DIR", help=text)
+
+
+def file_option(text: str) -> Any:
+    """An option that takes a file."""
+    return typer.Option(metavar="F", help=text)
+
+
+Json: TypeAlias = Annotated[str | None, file_option("Write it here ('-': output).")]
+Plot: TypeAlias = Annotated[str | None, file_option("Draw it: .png, .pdf, .svg.")]
+Quiet: TypeAlias = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
+
+
+@dataclass(frozen=True)
+class PathFiles:
+    """What is written of a path."""
+
+    json: Annotated[str | None, file_option("Write the record here ('-': output).")] = None
+    plot: Annotated[str | None, file_option("Draw the path: .png, .pdf or .svg.")] = None
+    rrd: Annotated[str | None, file_option("Record for playback with rerun: .rrd.")] = None
+    movie: Annotated[str | None, file_option("Film it: .gif, or .mp4 (needs ffmpeg).")] = None
+    html: Annotated[str | None, file_option("A page to scrub in any browser: .html.")] = None
+    beside: Annotated[
+        str | None, folder_option("Show the ring of this --out DIR, too, where it moves.")
+    ] = None
+    out: Annotated[str | None, folder_option("Write path.json, path.png and shapes.npz here.")] = (
+        None
+    )
+    quiet: Quiet = False
+
+    @property
+    def moving(self) -> bool:
+        """Whether something is written that shows how the ring moves."""
+        return any(file is not None for file in (self.rrd, self.movie, self.html))
+
+    @property
+    def drawn(self) -> bool:
+        """Whether shapes are needed."""
+        return self.moving or any(file is not None for file in (self.plot, self.out))
+
+    def other(self) -> Path | None:
+        """The path that is to be shown beside this one."""
+        if self.beside is None:
+            return None
+        if not self.moving:
+            raise ValueError(
+                f"beside must go with --rrd, --movie or --html, got {self.beside!r} alone"
+            )
+        return kept(self.beside)
+
+
+@dataclass(frozen=True)
+class ComparisonFiles:
+    """What a comparison writes."""
+
+    json: Annotated[str | None, file_option("Write both records and differences here.")] = None
+    plot: Annotated[str | None, file_option("Draw both: .png, .pdf or .svg.")] = None
+    out: Annotated[str | None, folder_option("Write comparison.json and .png here.")] = None
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no table.")] = False
+
+
+@dataclass(frozen=True)
+class LandscapeFiles:
+    """What is written of a landscape."""
+
+    json: Json = None
+    plot: Plot = None
+    rrd: Annotated[
+        str | None, file_option("Record it with the ring for playback with rerun: .rrd.")
+    ] = None
+    out: Annotated[str | None, folder_option("Write landscape.json and .png here.")] = None
+    quiet: Quiet = False
+
+
+@dataclass(frozen=True)
+class StatesFiles:
+    """What is written of states."""
+
+    json: Json = None
+    plot: Plot = None
+    out: Annotated[str | None, folder_option("Write states.json, .png and shapes.npz here.")] = None
+    quiet: Quiet = False
+
+
+@dataclass(frozen=True)
+class PlanarFiles:
+    """What is written of planar states."""
+
+    json: Json = None
+    plot: Plot = None
+    out: Annotated[str | None, folder_option("Write planar.json, .png and shapes.npz here.")] = None
+    quiet: Annotated[bool, typer.Option("--quiet", help="No summary.")] = False
+
+
+# --- Before the work -------------------------------------------------------------------------
+
+
+def targets(options: Any, stem: str, *, shapes: bool = False) -> Targets:
+    """The files to write, after making sure that they can be written.
+
+    Parameters
+    ----------
+    options : of files, one of the groups above.
+    stem : name of the files in the folder of --out, which are complete whatever else is named.
+    shapes : whether shapes.npz is one of them.
+
+    Raises
+    ------
+    ValueError
+        If a file has not the suffix that is needed, or cannot be written.
+    """
+    names = ("json", "plot", "rrd", "movie", "html")
+    named = {name: getattr(options, name, None) for name in names}
+    check_named(**named, out=options.out)
+    files: Targets = {}
+    if options.out is not None:
+        folder = made_folder(options.out)
+        files = {"json": [folder / f"{stem}.json"], "plot": [folder / f"{stem}.png"]}
+        if shapes:
+            files["shapes"] = [folder / "shapes.npz"]
+    _check_suffixes(named)
+    for name, given in named.items():
+        if given is not None and File(given) not in files.setdefault(name, []):
+            files[name].append(File(given))
+    others = [file for name, some in files.items() if name != "json" for file in some]
+    for file in files.get("json", []):
+        if file in others:
+            raise ValueError(f"json must be a file of its own, got {str(file)!r} twice")
+    for name, some in files.items():
+        for file in some:
+            if file != OUTPUT:
+                check_writable(name if name != "shapes" else "out", file)
+    return files
+
+
+def check_named(**given: str | None) -> None:
+    """Raise ValueError where the next option was taken for a file's name."""
+    for name, value in given.items():
+        if value is not None and value.startswith("-") and (name, value) != ("json", "-"):
+            raise ValueError(f"{name} must be a file name, got {value!r}")
+
+
+def made_folder(out: str) -> File:
+    """The folder of --out, made if it is not there."""
+    try:
+        File(out).mkdir(parents=True, exist_ok=True)
+    except OSError as wrong:
+        raise ValueError(f"out must be a folder, got {out!r}: {wrong.strerror}") from None
+    return File(out)
+
+
+def _check_suffixes(named: dict[str, str | None]) -> None:
+    """Raise ValueError where a name does not say the format that is written."""
+    plot, rrd, movie, html = (named[name] for name in ("plot", "rrd", "movie", "html"))
+    if plot is not None:
+        from der.viz.plots.style import FORMATS
+
+        if File(plot).suffix not in FORMATS:
+            raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {plot!r}")
+    if rrd is not None and File(rrd).suffix != ".rrd":
+        raise ValueError(f"rrd must end in .rrd, got {rrd!r}")
+    if movie is not None:
+        from der.viz.movie import check_movie
+
+        check_movie(movie)
+    if html is not None:
+        from der.viz.html import check_html
+
+        check_html(html)
+
+
+def check_writable(name: str, file: File) -> None:
+    """Raise ValueError where ``file`` cannot be written, before hours are spent on it."""
+    if file.is_dir():
+        raise ValueError(f"{name} must be a file, got the folder {str(file)!r}")
+    if file.exists() and not file.is_file():  # it would be replaced by a file: /dev/null!
+        raise ValueError(f"{name} must be a regular file, got {str(file)!r}")
+    try:
+        with tempfile.TemporaryFile(dir=file.parent):
+            pass
+    except OSError as wrong:
+        raise ValueError(
+            f"{name} must be a file in a folder that can be written to, got {str(file)!r}: "
+            f"{wrong.strerror}"
+        ) from None
+
+
+def kept(folder: str) -> Path:
+    """The path that an earlier command has kept in its --out folder, with its shapes.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or none with shapes.
+    """
+    from dataclasses import replace
+
+    from der.records.configurations import Shapes
+    from der.records.path import Path
+
+    check_named(beside=folder)
+    try:
+        path = Path.load(File(folder) / "path.json")
+        path = replace(path, shapes=Shapes.load(File(folder) / "shapes.npz"))
+    except OSError as wrong:
+        raise ValueError(
+            f"beside must be a folder with path.json and shapes.npz, as --out writes, "
+            f"got {folder!r}: {wrong.strerror}"
+        ) from None
+    except ValueError as wrong:
+        raise ValueError(
+            f"beside must be a folder as --out writes, got {folder!r}: {wrong}"
+        ) from None
+    if len(path) < 2:
+        raise ValueError(f"beside must hold a path of two states at least, got {folder!r}")
+    return path

@@ -1,0 +1,126 @@
+"""The record of a rod's path beside that of its boundary-value problem; free of kernels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from der.records.entries import Checked, Count, Number, Text
+from der.records.path import Path
+from der.records.record import Record
+
+
+@dataclass(frozen=True)
+class ComparedState(Checked):
+    """A state of the rod and its counterpart."""
+
+    gamma: Number  # rad
+    kind: Text  # "" or the kind of special point
+    rod_moment: Number  # GJ/a
+    rod_energy: Number
+    bvp_moment: Number
+    bvp_energy: Number
+    moment_distance: Number  # normal distance in (gamma/pi, M/max|M|)
+    moment_bar: Number | None  # allowed there: the rod's error bars, and the other's tolerance
+    energy_distance: Number
+    energy_bar: Number | None
+
+    @property
+    def agrees(self) -> bool | None:
+        """Whether both distances lie within their error bars; None where there are none."""
+        if self.moment_bar is None or self.energy_bar is None:
+            return None
+        return self.moment_distance <= self.moment_bar and self.energy_distance <= self.energy_bar
+
+    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries and whether both agree."""
+        return entries | {"agrees": self.agrees}
+
+    @classmethod
+    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries without what follows from them."""
+        entries.pop("agrees", None)
+        return entries
+
+
+@dataclass(frozen=True)
+class ComparedPoint(Checked):
+    """A fold or limit of both paths."""
+
+    kind: Text
+    rod_gamma: Number  # rad
+    bvp_gamma: Number
+    bar: Number | None  # the rod's error of gamma there, rad, and the other's
+
+    @property
+    def difference(self) -> float:
+        """In gamma, rad."""
+        return abs(self.rod_gamma - self.bvp_gamma)
+
+    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries and the difference."""
+        bar = entries.pop("bar")
+        return entries | {"difference": self.difference, "bar": bar}
+
+    @classmethod
+    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries without what follows from them."""
+        entries.pop("difference", None)
+        return entries
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Record):
+    """A rod's path and that of its boundary-value problem."""
+
+    NAME: ClassVar[str] = "comparison"
+    PLOT: ClassVar[str] = "der.viz.plots.comparison"
+
+    rod: Path
+    bvp: Path
+    states: tuple[ComparedState, ...]
+    pairs: tuple[ComparedPoint, ...]  # folds and limits, in path order
+    unmatched: Count  # states of the rod, and special points of either, without a counterpart
+
+    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries and the share that agrees; null where it is not known."""
+        share = None if math.isnan(self.within) else self.within
+        return super().on_disk(entries | {"within": share})
+
+    @classmethod
+    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries without what follows from them."""
+        entries.pop("within", None)
+        return super().from_disk(entries)
+
+    def facts(self) -> dict[str, str]:
+        """Which ring, and how well both agree."""
+        share = "no error bars" if math.isnan(self.within) else f"{100 * self.within:.1f} % agree"
+        moment, energy = self.largest
+        return {
+            "ring": str(self.rod.ring.get("shape")),
+            "states": f"{len(self.states)} states",
+            "agreement": share,
+            "moments": f"M within {moment:.1e}",
+            "energies": f"U within {energy:.1e}",
+        }
+
+    @property
+    def solve_s(self) -> float:
+        """Seconds that both solvers took."""
+        return self.rod.solve_s + self.bvp.solve_s
+
+    @property
+    def within(self) -> float:
+        """Share of the states with error bars that agree within them; NaN where there are none."""
+        known = [state.agrees for state in self.states if state.agrees is not None]
+        return sum(known) / len(known) if known else math.nan
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """Largest distances in M and in U."""
+        return (
+            max((state.moment_distance for state in self.states), default=math.nan),
+            max((state.energy_distance for state in self.states), default=math.nan),
+        )

@@ -1,0 +1,162 @@
+"""What every record can do: be saved and loaded, drawn, and shown in a line or a small table.
+
+A record names the module that draws it by text; it is imported when the record is drawn: so
+reading a file loads no matplotlib, and this package imports nothing of `der.viz`.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import pathlib
+from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+
+from der.records.codec import record_of
+from der.records.entries import Checked, Number, one_of, plain
+from der.utils.checks import shown
+from der.utils.files import FilePath, Saved, json_entries, json_lines
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SCHEMA = 1
+STATUSES = ("done", "not converged", "interrupted")
+LARGEST = 2**28  # bytes of a file that is read: a thousand times what a long path takes
+Status = Annotated[str, one_of(STATUSES)]
+
+
+@dataclass(frozen=True)
+class SolveTime(Checked):
+    """What the answer cost."""
+
+    solve_s: Number
+
+
+class Record(Checked, Saved):
+    """An answer: written as JSON with one entry a line, and read again."""
+
+    NAME: ClassVar[str]  # what it is, in a word
+    KIND: ClassVar[str] = ""  # the first entry; "": the file has none
+    PLOT: ClassVar[str]  # the module whose function `draw` makes the figure
+
+    timing: SolveTime
+
+    def to_json(self) -> str:
+        """JSON text of schema 1, one entry a line."""
+        return json_lines(plain(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Record of a JSON text.
+
+        Raises
+        ------
+        ValueError
+            If it is not JSON, of another kind or schema, or not such a record; the message says
+            where and what is allowed there.
+        """
+        return record_of(cls, json_entries(text))
+
+    @classmethod
+    def load(cls, path: FilePath) -> Self:
+        """Record of a JSON file.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If it is too large, broken or of another kind or schema; the message names the file and
+            what is wrong.
+        """
+        file = pathlib.Path(path)
+        try:
+            if file.stat().st_size > LARGEST:
+                raise ValueError(f"a record has at most {LARGEST} bytes, not {file.stat().st_size}")
+            return cls.from_json(_decoded(file.read_bytes()))
+        except ValueError as problem:
+            raise ValueError(f"{os.fspath(path)}: {problem}") from problem
+
+    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries after kind and schema."""
+        return ({"kind": self.KIND} if self.KIND else {}) | {"schema": SCHEMA} | entries
+
+    @classmethod
+    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
+        """The entries without kind and schema, which are checked."""
+        kind = entries.pop("kind", "")
+        if kind != cls.KIND:
+            if not cls.KIND:
+                raise ValueError(f"not a {cls.NAME} but a record of kind {shown(kind)}")
+            if not kind:
+                raise ValueError(f"not a record of {cls.KIND}")
+            raise ValueError(f"kind is {shown(kind)}, not {cls.KIND!r}")
+        if (schema := entries.pop("schema", None)) != SCHEMA:
+            raise ValueError(f"schema is {shown(schema)}, this version reads {SCHEMA}")
+        return entries
+
+    @property
+    def solve_s(self) -> float:
+        """Seconds that the solver took."""
+        return self.timing.solve_s
+
+    # --- Shown ---------------------------------------------------------------------------------
+
+    def facts(self) -> dict[str, str]:
+        """The main facts, each in a few words, by what it is a fact of."""
+        raise NotImplementedError
+
+    def plot(self, file: FilePath | None = None) -> Figure:
+        """Draw the record.
+
+        Parameters
+        ----------
+        file : where to write the picture, by its suffix .png, .pdf or .svg; None: nowhere.
+
+        Returns
+        -------
+        matplotlib Figure
+            To be shown or changed further.
+
+        Raises
+        ------
+        ValueError
+            If there is nothing to draw, or the file cannot be written.
+        """
+        figure: Figure = import_module(self.PLOT).draw(self)
+        if file is not None:
+            import_module("der.viz.plots.style").save(figure, file)
+        return figure
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self.facts().values())})"
+
+    def _repr_html_(self) -> str:
+        """A table of the main facts, and the picture, for notebooks."""
+        rows = "".join(
+            f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>"
+            for name, text in self.facts().items()
+        )
+        return f"<table><caption>{escape(self.NAME)}</caption>{rows}</table>{self._picture()}"
+
+    def _picture(self) -> str:
+        """The picture as an element of HTML; "" where there is nothing to draw."""
+        try:
+            figure = self.plot()
+        except ValueError:
+            return ""
+        png = io.BytesIO()
+        figure.savefig(png, format="png", dpi=90)
+        data = base64.b64encode(png.getvalue()).decode()
+        return f'<img alt="{escape(self.NAME)}" src="data:image/png;base64,{data}">'
+
+
+def _decoded(content: bytes) -> str:
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise ValueError("no text file") from None

@@ -1,0 +1,74 @@
+"""The benchmark and the stress test, from a clone.
+
+    python -m validation benchmark [--quick] [--only PARTS] [--json F] [--out DIR]
+    python -m validation stress [--quick | --long] [--workers N] [--seed N] [--json F]
+
+`der bench` and `der stress` do the same where the clone is the current folder.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path as File
+
+import typer
+
+from der.cli.clone import BenchOptions, StressOptions
+from der.cli.commands import leave
+from der.cli.files import check_named, check_writable, made_folder
+from der.cli.output import show
+from der.cli.parsing import add_command, options_named
+
+app = typer.Typer(
+    help="The evidence: benchmark and stress test.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def benchmark(wanted: BenchOptions) -> int:
+    """Measure time, memory and error of this package and its peers, on this machine, in one run."""
+    with options_named():
+        check_named(json=wanted.json, out=wanted.out)
+        file = _writable(wanted.json)
+        folder = None if wanted.out is None else made_folder(wanted.out)
+        if folder is not None:
+            check_writable("json", folder / "bench.json")
+        from validation.benchmark.run import PARTS, run
+
+        only = wanted.only
+        parts = PARTS if only is None else tuple(part.strip() for part in only.split(","))
+        run(file, out=folder, quick=wanted.quick, only=parts)
+    return 0
+
+
+def stress(wanted: StressOptions) -> int:
+    """Try to break both solvers, and count what has no named reason."""
+    with options_named():
+        if wanted.quick and wanted.long:
+            raise ValueError("quick cannot be given together with --long, got both")
+        check_named(json=wanted.json)
+        file = _writable(wanted.json)
+        from validation.stress.run import stress as run
+
+        workers = 1 if wanted.workers is None and not wanted.long else wanted.workers
+        level = "long" if wanted.long else "quick"
+        summary = run(level, file, seed=wanted.seed, workers=workers)
+    show(str(summary))
+    return 130 if summary.interrupted else 0
+
+
+def _writable(json: str | None) -> File | None:
+    """The file of --json, after making sure that it can be written."""
+    if json is None:
+        return None
+    check_writable("json", File(json))
+    return File(json)
+
+
+for _command in (benchmark, stress):
+    add_command(app, _command)
+
+if __name__ == "__main__":
+    leave(app, "python -m validation", sys.argv[1:])
