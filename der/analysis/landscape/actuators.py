@@ -13,8 +13,8 @@ In both the load is what is prescribed: a length, or an angle. Its conjugate dL/
 or the couple, dU is its work, and a state's index is that of the ring in its actuator, held.
 
 The ring is renumbered so that the first point is edge 0, whose frame is held: by the wrench,
-or to take out rigid rotations. With a strut, it is cut there and stands at both ends of an open rod, in
-halves; both are held alike, so that they stay one.
+or to take out rigid rotations. With a strut, it is cut there and stands at both ends of an open
+rod, in halves; both are held alike, so that they stay one.
 """
 
 from __future__ import annotations

@@ -13,28 +13,37 @@ How stable a state is counts in its plane only; `states` knows of space.
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from der.continuation.arclength import follow
+from der.continuation.events import Events
 from der.continuation.richardson import limit
-from der.errors import STOPPED
-from der.kernels.planar import Array, negative_planar
+from der.errors import ContinuationFailed, Reason
+from der.kernels.planar import Array
+from der.problem import Options
 from der.records.planar import FOLDED, PlanarState, PlanarStates
 from der.records.record import SolveTime
-from der.rod.planar_march import Lost, Solved, march, solved
 from der.rod.planar_ring import PlanarRing, covered, eight, planar_ring, shapes, shifted
+from der.rod.planar_system import (
+    PlanarConfiguration,
+    PlanarEquilibrium,
+    PlanarRodSystem,
+    solved,
+)
 from der.scene import Scene, meshes, sector_name
 from der.utils.checks import shown
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 MOST = 12  # turns
 _TURNS = 3
 _EDGES_A_TURN = 8  # at least
 _IMPERFECTION = 1.0  # rad, of one wave on the ring, on the way to it
+# other branches may lie close by: steps no longer than these
+_OPTIONS = Options(first_step=0.02, largest_step=0.08, sharpest_turn=0.45)
 _ALIKE = 1e-7  # of the energies of two states that are one
 _COSTLESS = 1e-6  # of EI1 (2 pi/L)^2: stiffness of a motion that costs nothing
 
@@ -44,7 +53,7 @@ class Found:
     """A planar state on its mesh."""
 
     turning: int
-    at: Solved
+    at: PlanarEquilibrium
     pin: Array | None  # the shift of the material, where it costs nothing
 
 
@@ -70,29 +79,24 @@ def planar(scene: Scene, *, turns: int | None = None) -> PlanarStates:
         Naming the argument, its value and what is allowed.
     """
     most = check_planar(scene, turns)
-    began = time.perf_counter()
     mesh = planar_ring(scene)
-    found: list[Found] = []
-    with interrupts_between_states() as pressed:
-        for turning in [k for t in range(most + 1) for k in dict.fromkeys((t, -t))]:
-            if turning < 0 and scene.ring.natural_ratio == 0.0:
-                continue  # the mirror image
-            found += states_of_turning(mesh, turning, scene.tolerance)
-            if pressed:
-                break
-        found.sort(key=lambda one: one.at.energy)
+    both_ways = [k for t in range(most + 1) for k in dict.fromkeys((t, -t))]
+    # of a naturally straight ring those that turn the other way are mirror images
+    turnings = [k for k in both_ways if k >= 0 or scene.ring.natural_ratio != 0.0]
+    with Run() as run:
+        each = run.collect(states_of_turning(mesh, k, scene.tolerance) for k in turnings)
+        found = sorted((one for several in each for one in several), key=lambda one: one.at.energy)
         rows, kept = _distinct([_described(scene, mesh, one) for one in found])
-    status, message = ("interrupted", STOPPED) if pressed else ("done", "")
-    if not found and not pressed:
-        status, message = "not converged", "no state was found from any start; use more edges"
+        if not found and run.done:
+            run.stop(Reason.NO_START, "no state was found from any start; use more edges")
     return PlanarStates(
-        status=status,
-        message=message,
+        status=run.status,
+        message=run.message,
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
         numerics=planar_numerics(scene),
         states=named(rows),
-        timing=SolveTime(time.perf_counter() - began),
+        timing=SolveTime(run.seconds),
         shapes=shapes(mesh, [found[k].at.phi for k in kept]) if found else None,
     )
 
@@ -183,20 +187,25 @@ def _eights(mesh: PlanarRing, tolerance: float) -> Iterator[Found]:
 
 def _led(
     mesh: PlanarRing, turning: int, natural: Array, phi: Array, pin: Array | None, tolerance: float
-) -> Solved | None:
+) -> PlanarEquilibrium | None:
     """The state that one of a ring of these natural angles becomes in this ring; None: none."""
     turn = float(mesh.rest.sum())
     begin = np.diff(np.append(natural, natural[0] + turn))
     rod = mesh.rod(turning, begin, mesh.rest - begin)
+    system = PlanarRodSystem(rod, pin)
     start = solved(rod, phi, np.zeros(2), 0.0, pin=pin, tolerance=tolerance)
     if not start.converged:
         return None
+    events: Events[PlanarConfiguration] = Events(
+        targets=(1.0,), stop=lambda at: at.parameter == 1.0
+    )
+    options = replace(_OPTIONS, tolerance=tolerance)
     try:
-        *_, last = march(rod, start, 1.0, pin=pin, tolerance=tolerance)
-    except Lost:
+        *_, last = follow(system, start.state, events, options=options)
+    except ContinuationFailed:
         return None
-    at = last.at
-    end = solved(mesh.rod(turning), at.phi, at.force, pin=pin, tolerance=tolerance)
+    phi, force, _ = last.solution.state
+    end = solved(mesh.rod(turning), phi, force, pin=pin, tolerance=tolerance)
     return end if end.converged else None
 
 
@@ -245,7 +254,7 @@ def packing_ratio_of(mesh: PlanarRing, phi: Array, turning: int) -> tuple[float,
 
 def _on_coarser(
     coarse: PlanarRing, one: Found, fine: PlanarRing, tolerance: float
-) -> Solved | None:
+) -> PlanarEquilibrium | None:
     """The same state on a mesh of every second edge, or fourth; None: there is none."""
     every = fine.n_edges // coarse.n_edges
     pin = None if one.pin is None else one.pin[::every]
@@ -264,9 +273,9 @@ def _sure(levels: list[float]) -> tuple[float, float | None]:
 
 def _index(mesh: PlanarRing, one: Found) -> tuple[int | None, int]:
     """Ways down in the plane, and motions that cost nothing."""
-    rod, at = mesh.rod(one.turning), one.at
+    system, at = PlanarRodSystem(mesh.rod(one.turning)), one.at
     small = _COSTLESS * (2.0 * math.pi / mesh.ring.length) ** 2
-    up, down = (negative_planar(rod, at.phi, at.force, 0.0, s) for s in (small, -small))
+    up, down = (system.negative(at.state, shift) for shift in (small, -small))
     if up < 0 or down < 0:
         return None, 0
     return up - len(at.force), down - up

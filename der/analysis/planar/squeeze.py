@@ -12,25 +12,34 @@ one's. Special points are found on each mesh and matched in their order.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from der.analysis.planar.planar_states import check_planar, coarser, planar_numerics
+from der.continuation.arclength import follow
+from der.continuation.events import Events
 from der.continuation.richardson import limit
-from der.errors import STOPPED
-from der.kernels.planar import Array, PlanarRod
+from der.errors import ContinuationFailed, Reason
+from der.kernels.planar import Array
+from der.problem import Options, Point
 from der.records.planar import Squeeze, SqueezePoint
 from der.records.record import SolveTime
-from der.rod.planar_march import Lost, Solved, Stop, kinds, march, solved
 from der.rod.planar_ring import PlanarRing, covered, planar_ring, shapes
+from der.rod.planar_system import (
+    PlanarConfiguration,
+    PlanarEquilibrium,
+    PlanarRodSystem,
+    solved,
+)
 from der.scene import Scene
 from der.utils.checks import checked_number
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 _THERE = 1e-9  # of the distance: the flat ring is where it should go
+# the shape may have other branches close by: steps no longer than these
+_OPTIONS = Options(first_step=0.02, largest_step=0.08, sharpest_turn=0.45)
 _SAME = 0.3  # rad: a state on another mesh that is further away is another state
 
 
@@ -59,36 +68,26 @@ def squeeze(scene: Scene, distance: float = 0.0) -> Squeeze:
     straight = 0.5 * scene.ring.length
     allowed = f"a number from 0 to less than {straight:.6g} (the ring drawn straight)"
     goal = checked_number("distance", distance, allowed, lambda d: 0.0 <= d < straight)
-    began = time.perf_counter()
     track = _Track.of(planar_ring(scene), scene)
-    stops: list[Stop] = []
-    status, message = "done", ""
-    with interrupts_between_states() as pressed:
-        try:
-            for stop in track.path(goal):
-                stops.append(stop)
-                if pressed:
-                    status, message = "interrupted", STOPPED
-                    break
-        except Lost as lost:
-            status, message = "not converged", f"{lost} a between the points"
-        found = _extrapolated(track, stops, goal, scene)
-    special = [k for k, stop in enumerate(stops) if stop.kind]
+    with Run() as run:
+        points = run.collect(track.path(goal))
+        found = _extrapolated(track, points, goal, scene)
+    special = [k for k, one in enumerate(points) if one.kind]
     column = dict(zip(("distance", "force", "energy"), found.values.T, strict=True))
     return Squeeze(
-        status=status,
-        message=message,
+        status=run.status,
+        message=run.message,
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
         numerics=planar_numerics(scene),
         goal=goal,
         **column,
-        index=tuple(stop.at.index for stop in stops),
+        index=tuple(one.solution.index for one in points),
         force_error=found.errors[:, 1],
         energy_error=found.errors[:, 2],
-        points=tuple(_point(stops[k], found.values[k], found.errors[k]) for k in special),
-        timing=SolveTime(time.perf_counter() - began),
-        shapes=shapes(track.mesh, [stop.at.phi[:-1] for stop in stops]) if stops else None,
+        points=tuple(_point(points[k], found.values[k], found.errors[k]) for k in special),
+        timing=SolveTime(run.seconds),
+        shapes=shapes(track.mesh, [one.solution.phi[:-1] for one in points]) if points else None,
     )
 
 
@@ -97,12 +96,12 @@ class _Track:
     """A ring on its mesh with a strut in it."""
 
     mesh: PlanarRing
-    rod: PlanarRod
-    flat: Solved
+    system: PlanarRodSystem
+    flat: PlanarEquilibrium
     first: float  # distance between the points of the flat ring on this mesh
     scale: float  # that over the distance of the ring itself; 1 without error bars
     alpha: float
-    tolerance: float
+    options: Options
 
     @classmethod
     def of(cls, mesh: PlanarRing, scene: Scene) -> _Track:
@@ -111,32 +110,42 @@ class _Track:
         first = float(mesh.way() @ (mesh.length * np.sin(flat.phi)))
         ends = scene.ring.position([0.0, 0.5 * scene.ring.length])
         scale = first / float(ends[1, 2] - ends[0, 2]) if scene.error_bars else 1.0
-        alpha = scene.section.alpha
-        return cls(mesh, mesh.strutted(), flat, first, scale, alpha, scene.tolerance)
+        system = PlanarRodSystem(mesh.strutted(), parameter_name="distance")
+        options = replace(_OPTIONS, tolerance=scene.tolerance)
+        return cls(mesh, system, flat, first, scale, scene.section.alpha, options)
 
-    def path(self, goal: float) -> Iterator[Stop]:
-        """States from the flat ring on to a distance, special points in their places."""
-        start = self.at(
-            self.first, self.flat.phi, 0.5 * math.pi, np.append(self.flat.force, [0, 0])
-        )
+    def path(self, goal: float) -> Iterator[Point[PlanarEquilibrium]]:
+        """Points from the flat ring on to a distance, special ones in their places."""
+        forces = np.append(self.flat.force, [0, 0])
+        start = self.at(self.first, self.flat.phi, 0.5 * math.pi, forces)
         if not start.converged:
-            raise Lost(f"the flat ring was not found at rest, use more edges: {self.first:.8g}")
-        if abs(goal * self.scale - self.first) < _THERE * self.first:
-            yield Stop(start)
-            return
+            raise ContinuationFailed(
+                f"the flat ring was not found at rest, use more edges: {start.advice}",
+                Reason.NO_START,
+            )
         goal = goal * self.scale
-        yield from march(self.rod, start, goal, special=True, tolerance=self.tolerance)
+        if abs(goal - self.first) < _THERE * self.first:
+            yield Point(start)
+            return
+        events: Events[PlanarConfiguration] = Events(
+            targets=(goal,),
+            stop=lambda at: at.parameter == goal,
+            limits=("moment",),
+            stability=True,
+        )
+        along = self.system.increment(load=math.copysign(1.0, goal - self.first))
+        yield from follow(self.system, start.state, events, along=along, options=self.options)
 
-    def at(self, length: float, phi: Array, turn: float, force: Array) -> Solved:
+    def at(self, length: float, phi: Array, turn: float, force: Array) -> PlanarEquilibrium:
         """The state with a strut of a length, near a configuration."""
-        rod = self.rod
-        if length == 0.0:  # such a strut has no direction
-            rod = rod._replace(free=rod.free & (rod.reach == 0.0))
-        return solved(rod, np.append(phi, turn), force, length, tolerance=self.tolerance)
+        start = PlanarConfiguration(np.append(phi, turn), force, length)
+        return self.system.correct(start, tolerance=self.options.tolerance)
 
-    def values(self, one: Solved) -> Array:
+    def values(self, one: PlanarEquilibrium) -> Array:
         """Distance, force and energy (3,), the distance as a share of the ring's own."""
-        return np.array([one.load / self.scale, self.alpha * one.moment, self.alpha * one.energy])
+        return np.array(
+            [one.parameter / self.scale, self.alpha * one.moment, self.alpha * one.energy]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,18 +156,20 @@ class _Columns:
     errors: Array  # (n, 3) NaN: not known
 
 
-def _extrapolated(track: _Track, stops: list[Stop], goal: float, scene: Scene) -> _Columns:
+def _extrapolated(
+    track: _Track, points: list[Point[PlanarEquilibrium]], goal: float, scene: Scene
+) -> _Columns:
     """Values of the states, with errors where there are coarser meshes."""
-    values = np.array([track.values(stop.at) for stop in stops]).reshape(-1, 3)
+    values = np.array([track.values(one.solution) for one in points]).reshape(-1, 3)
     errors = np.full_like(values, np.nan)
     levels = [_Track.of(mesh, scene) for mesh in coarser(scene)]
-    special = [k for k, stop in enumerate(stops) if stop.kind]
-    others = [_special(level, stops, goal) for level in levels] if special else []
-    for k, stop in enumerate(stops if levels else ()):
-        if stop.kind:
+    special = [k for k, one in enumerate(points) if one.kind]
+    others = [_special(level, points, goal) for level in levels] if special else []
+    for k, one in enumerate(points if levels else ()):
+        if one.kind:
             same = [other[special.index(k)] for other in others if other]
         else:
-            same = [found for level in levels for found in _again(level, track, stop.at)]
+            same = [found for level in levels for found in _again(level, track, one.solution)]
         if len(same) < len(levels):
             continue
         for c in range(3):
@@ -166,35 +177,36 @@ def _extrapolated(track: _Track, stops: list[Stop], goal: float, scene: Scene) -
     return _Columns(values, errors)
 
 
-def _again(level: _Track, fine: _Track, one: Solved) -> list[Array]:
+def _again(level: _Track, fine: _Track, one: PlanarEquilibrium) -> list[Array]:
     """Values of the same state on a coarser mesh; none where there is none."""
     every = fine.mesh.n_edges // level.mesh.n_edges
-    length = one.load * level.scale / fine.scale
+    length = one.parameter * level.scale / fine.scale
     at = level.at(length, one.phi[:-1:every], float(one.phi[-1]), one.force)
     near = np.abs(at.phi[:-1] - one.phi[:-1:every]).max() < _SAME if at.converged else False
     return [level.values(at)] if near else []
 
 
-def _special(level: _Track, stops: list[Stop], goal: float) -> list[Array]:
+def _special(level: _Track, points: list[Point[PlanarEquilibrium]], goal: float) -> list[Array]:
     """Values of the special points of a coarser mesh; none where they are others."""
     try:
         found = list(level.path(goal))
-    except Lost:
+    except ContinuationFailed:
         return []
-    alike = kinds(found) == kinds(stops)
-    return [level.values(stop.at) for stop in found if stop.kind] if alike else []
+    alike = [one.kind for one in found if one.kind] == [one.kind for one in points if one.kind]
+    return [level.values(one.solution) for one in found if one.kind] if alike else []
 
 
-def _point(stop: Stop, values: Array, errors: Array) -> SqueezePoint:
+def _point(one: Point[PlanarEquilibrium], values: Array, errors: Array) -> SqueezePoint:
     distance, force, energy = map(float, values)
+    (before,), (after,) = one.sides or (one.index or (None,), one.index or (None,))
     known = [None if np.isnan(error) else float(error) for error in errors]
     return SqueezePoint(
-        stop.kind,
+        one.kind,
         distance,
         force,
         energy,
-        stop.before,
-        stop.after,
+        before,
+        after,
         distance_error=known[0],
         force_error=known[1],
         energy_error=known[2],

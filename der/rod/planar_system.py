@@ -1,0 +1,177 @@
+"""A rod that stays in a plane as a system that can be followed; see `kernels.planar`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from der.kernels.planar import Array, PlanarRod, correct_planar, negative_planar
+from der.problem import PARAMETER, PLANE, Increment, Indices, Solution
+from der.rod.equilibrium import REASONS
+
+
+class PlanarConfiguration(NamedTuple):
+    """One configuration of a planar rod."""
+
+    phi: Array  # (n,) angles of the edges, rad
+    force: Array  # (m,) multipliers of the position conditions
+    load: float
+
+
+@dataclass(frozen=True)
+class PlanarEquilibrium(Solution[PlanarConfiguration]):
+    """An equilibrium of a planar rod: observables "moment", conjugate to the load, and "energy"."""
+
+    @property
+    def phi(self) -> Array:
+        """Angles (n,) of the edges [rad]."""
+        return self.state.phi
+
+    @property
+    def force(self) -> Array:
+        """Multipliers (m,) of the position conditions."""
+        return self.state.force
+
+    @property
+    def moment(self) -> float:
+        """DL/dload."""
+        return self.observables["moment"][0]
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy; EI1 is 1."""
+        return self.observables["energy"][0]
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarRodSystem:
+    """A planar rod under a load that is the parameter.
+
+    Parameters
+    ----------
+    pin : (n,) direction in which nothing is corrected: a motion that costs nothing.
+    """
+
+    rod: PlanarRod
+    pin: Array | None = None
+    parameter_name: str = "load"
+    conjugate: str = field(default="moment", init=False)
+    classes: Mapping[str, int] = field(default_factory=lambda: {"planar": 1}, init=False)
+    soft: float = field(default=0.0, init=False)
+
+    @cached_property
+    def _weight(self) -> Array:
+        """Weights (m,) of an increment: mass, 0 for forces, 1 for the load."""
+        forces = np.zeros(2 * len(self.rod.weight))
+        return np.concatenate([np.where(self.rod.free, self.rod.mass, 0.0), forces, [1.0]])
+
+    def increment(self, *, load: float) -> Increment:
+        """Return the increment of the load alone."""
+        increment = np.zeros(len(self._weight))
+        increment[-1] = load
+        return increment
+
+    def correct(
+        self,
+        guess: PlanarConfiguration,
+        *,
+        along: Increment | None = None,
+        hold: str = PARAMETER,
+        value: float | None = None,
+        tolerance: float = 1e-10,
+        iterations: int = 12,
+    ) -> PlanarEquilibrium:
+        """Return the equilibrium near ``guess``; ``hold`` is PARAMETER or PLANE."""
+        if hold not in (PARAMETER, PLANE):
+            raise ValueError(f"hold must be {PARAMETER!r} or {PLANE!r} in a plane, got {hold!r}")
+        n, load = len(self.rod.length), guess.load if value is None else value
+        rod = self._rod_at(load) if hold == PARAMETER else self.rod
+        along = self.increment(load=1.0) if along is None else along
+        row = (self._weight * along)[:n, None]
+        pin = np.zeros((n, 1, 0)) if self.pin is None else self.pin[:, None, None]
+        found = correct_planar(
+            rod, guess.phi, guess.force, float(load), hold == PLANE, row, float(along[-1]), pin,
+            tolerance, iterations,
+        )  # fmt: skip
+        return self._equilibrium(found, pin.shape[2])
+
+    def _rod_at(self, load: float) -> PlanarRod:
+        """The rod at a load; a strut of no length has no direction that could change."""
+        if load != 0.0 or not self.rod.reach.any():
+            return self.rod
+        return self.rod._replace(free=self.rod.free & (self.rod.reach == 0.0))
+
+    def _equilibrium(self, found: tuple[Any, ...], pins: int) -> PlanarEquilibrium:
+        outcome, taken, residual, phi, force, load, energy, moment, *rates = found
+        phi_rate, force_rate, load_rate, moment_rate, negative, bent = rates
+        m = len(force)
+        return PlanarEquilibrium(
+            state=PlanarConfiguration(phi, force, load),
+            parameter=load,
+            tangent=np.concatenate([phi_rate[:, 0, 0], force_rate[:m, 0], [load_rate]]),
+            observables={"moment": (moment, moment_rate), "energy": (energy, moment * load_rate)},
+            index=negative - m - pins if negative >= 0 else None,
+            reason=REASONS[outcome],
+            detail=f"vertex {bent}" if bent >= 0 else "",
+            iterations=taken,
+            residual=residual,
+        )
+
+    def retract(self, state: PlanarConfiguration, increment: Increment) -> PlanarConfiguration:
+        """Return a configuration moved by an increment."""
+        n = len(state.phi)
+        phi, force = state.phi + increment[:n], state.force + increment[n:-1]
+        return PlanarConfiguration(phi, force, state.load + float(increment[-1]))
+
+    def difference(self, a: PlanarConfiguration, b: PlanarConfiguration) -> Increment:
+        """Return the increment that leads from one configuration to another.
+
+        Nothing corrects rounding along the pin, and extrapolation from step to step would make it
+        grow: it is taken out.
+        """
+        turn = b.phi - a.phi
+        if self.pin is not None:
+            turn = turn - self.pin * (self.pin @ turn) / (self.pin @ self.pin)
+        return np.concatenate([turn, b.force - a.force, [b.load - a.load]])
+
+    def transport(self, along: Increment, rates: Increment) -> Increment:
+        """Return the rates as they are: angles are a flat space."""
+        return rates.copy()
+
+    def inner(self, a: Increment, b: Increment) -> float:
+        """Return the inner product, weighted by the lengths of the edges."""
+        return float(np.sum(self._weight * a * b))
+
+    def indices(
+        self, state: PlanarConfiguration, symmetry: str | None = None
+    ) -> tuple[Indices, tuple[float, ...]]:
+        """Return the index in the plane; no stiffness is estimated."""
+        count = self.count(state, symmetry or "planar")
+        return (count if count >= 0 else None,), (np.inf,)
+
+    def count(self, state: PlanarConfiguration, symmetry: str) -> int:
+        """Return the negative eigenvalues in the plane; below 0: not known."""
+        return self.negative(state, 0.0) - len(state.force)
+
+    def negative(self, state: PlanarConfiguration, shift: float) -> int:
+        """Return those of the bordered Hessian with ``shift`` added to every stiffness."""
+        return int(negative_planar(self._rod_at(state.load), *state, shift))
+
+
+def solved(
+    rod: PlanarRod,
+    phi: Array,
+    force: Array,
+    load: float = 0.0,
+    *,
+    pin: Array | None = None,
+    tolerance: float = 1e-10,
+) -> PlanarEquilibrium:
+    """Return the equilibrium next to a configuration, the load given."""
+    return PlanarRodSystem(rod, pin).correct(
+        PlanarConfiguration(phi, force, load), tolerance=tolerance
+    )
