@@ -22,15 +22,14 @@ from pathlib import Path as File
 import numpy as np
 
 import der
-from der.continuation.arclength import follow
-from der.continuation.events import Wanted, three_covered
-from der.continuation.step import Tally
+from der.analysis.request import Request
 from der.geometry.ring import Ring
 from der.kernels.assembly import assemble
-from der.rod.equilibrium import Equilibrium, equilibrium
-from der.rod.gripped_ring import Sector, free_ring, sector
+from der.problem import total_index
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, free_supports, gripped_ring
 from der.rod.rod import State
-from der.rod.stability import all_modes, index, softest_modes
+from der.rod.system import RodSystem
 from validation.arguments import Arguments
 
 EDGES = 128
@@ -59,94 +58,88 @@ class Folded:
             Where twisting does not lead to it.
         """
         section = der.rectangular_section(h_over_t)
-        piece = sector(ring, section, n_edges)
+        gripped = gripped_ring(ring, section, n_edges)
         if ring.symmetry == "D2":
-            at = equilibrium(piece.body, piece.held, _evenly_bent(ring, piece))
-            if at.converged and three_covered(piece, at):
+            at = gripped.correct(_evenly_bent(ring, gripped))
+            if at.converged and gripped.folded(at.state):
                 return cls(ring, n_edges, section.alpha, at.state)
-        wanted = Wanted(stability=False, contacts=False)
-        *_, last = follow(piece, wanted, Tally())
-        if not three_covered(piece, last.at):
+        *_, last = Request(stability=False, self_crossings=False).follow(gripped)
+        state = last.solution.state
+        if not gripped.folded(state):
             raise ValueError(f"ring {ring!r} is not folded by twisting at h/t = {h_over_t}")
-        return cls(ring, n_edges, section.alpha, last.at.state)
+        return cls(ring, n_edges, section.alpha, state)
 
-    def gripped(self, h_over_t: float, name: str = "auto") -> tuple[Sector, Equilibrium]:
+    def gripped(self, h_over_t: float, name: str = "auto") -> tuple[GrippedRing, Equilibrium]:
         """The state in the grips, with another section, on a sector."""
         section = der.rectangular_section(h_over_t)
-        own = sector(self.ring, section, self.n_edges)
+        own = gripped_ring(self.ring, section, self.n_edges)
         if name == "auto":
-            piece, quat = own, self.state.quat
+            ring, quat = own, self.state.quat
             force = self.state.force * (section.alpha / self.alpha)
         else:
-            piece = sector(self.ring, section, self.n_edges, name=name)
-            quat = own.full_frames(self.state)[: piece.body.n_edges]
-            force = np.zeros(len(piece.held.target))
+            ring = gripped_ring(self.ring, section, self.n_edges, name=name)
+            quat = own.full_frames(self.state)[: ring.rod.n_edges]
+            force = np.zeros(len(ring.supports.target))
         start = State(quat, np.zeros(len(quat)), force, math.pi)
-        at = equilibrium(piece.body, piece.held, start, iterations=30)
+        at = ring.correct(start, iterations=30)
         if not at.converged:
-            raise ValueError(f"ring {self.ring!r} at h/t = {h_over_t}: {at.outcome.name}")
-        return piece, at
+            raise ValueError(f"ring {self.ring!r} at h/t = {h_over_t}: {at.advice}")
+        return ring, at
 
     def index(self, h_over_t: float) -> int:
         """Index with the grips held at pi."""
-        piece, at = self.gripped(h_over_t)
-        counts = [
-            (times, index(piece.body, piece.held, modes, at.state))
-            for times, modes in piece.classes.values()
-        ]
-        return sum(times * (count or 0) for times, count in counts)
+        ring, at = self.gripped(h_over_t)
+        counts, _ = ring.indices(at.state)
+        return total_index(ring, tuple(count or 0 for count in counts)) or 0
 
     def slope(self, h_over_t: float) -> float:
         """dM/dgamma [GJ/a]."""
-        piece, at = self.gripped(h_over_t)
-        return piece.moment(at.slope)
+        ring, at = self.gripped(h_over_t)
+        return ring.arm_moment(at.slope)
 
     def index_moment(self, h_over_t: float) -> int:
         """Index under a moment."""
         return self.index(h_over_t) + (self.slope(h_over_t) < 0.0)
 
-    def alone(self, h_over_t: float) -> tuple[Sector, State]:
-        """The full ring without grips: its body, and the state with the forces that close it."""
+    def alone(self, h_over_t: float) -> tuple[RodSystem, State]:
+        """The full ring without grips, and the state with the forces that close it."""
         section = der.rectangular_section(h_over_t)
-        own = sector(self.ring, section, self.n_edges)
-        whole = sector(self.ring, section, self.n_edges, name="full")
-        held = free_ring(whole.body)
+        own = gripped_ring(self.ring, section, self.n_edges)
+        full = gripped_ring(self.ring, section, self.n_edges, name="full")
+        free = RodSystem(full.rod, free_supports(full.rod))
         quat = own.full_frames(self.state)
-        force = _closing_force(whole, quat)
+        force = _closing_force(free, quat)
         start = State(quat, np.zeros(len(quat)), force, 0.0)
-        at = equilibrium(whole.body, held, start)
-        return whole, at.state if at.converged else start
+        at = free.correct(start)
+        return free, at.state if at.converged else start
 
     def index_free(self, h_over_t: float) -> int:
         """Index of the ring left alone."""
-        whole, state = self.alone(h_over_t)
-        held = free_ring(whole.body)
-        count = index(whole.body, held, all_modes(held), state)
+        free, state = self.alone(h_over_t)
+        count = free.index(state)
         return -1 if count is None else count  # at a threshold, to rounding
 
     def softest_free(self, h_over_t: float, count: int = 3) -> list[float]:
         """Stiffnesses nearest to zero of the ring left alone [GJ/a^2]."""
-        whole, state = self.alone(h_over_t)
-        held = free_ring(whole.body)
-        return softest_modes(whole.body, held, all_modes(held), state, count)[0].tolist()
+        free, state = self.alone(h_over_t)
+        return free.softest_modes(state, count)[0].tolist()
 
 
-def _evenly_bent(ring: Ring, piece: Sector) -> State:
+def _evenly_bent(ring: Ring, gripped: GrippedRing) -> State:
     """A D2 ring's folded state: the curvature is the natural one and 4 pi/L (paper, Eq. B.1)."""
-    s = piece.arc_length
+    s = gripped.arc_length
     angle = ring.natural_angle(s) - ring.natural_angle(s[-1])
     angle += 4.0 * np.pi / ring.length * (s - s[-1])
     a = 0.5 * (angle + ring.angle(s[-1]) - 0.5 * np.pi)
     # about E1 by the angle, then about E3 by -pi: (0, 0, 0, -1) o (cos a, sin a, 0, 0)
     quat = np.stack([0.0 * a, 0.0 * a, -np.sin(a), -np.cos(a)], axis=1)
-    return piece.start.but(quat=quat, load=math.pi)
+    return gripped.start.but(quat=quat, load=math.pi)
 
 
-def _closing_force(whole: Sector, quat: np.ndarray) -> np.ndarray:
+def _closing_force(ring: RodSystem, quat: np.ndarray) -> np.ndarray:
     """The internal force of a closed ring at rest, from its frames, by least squares."""
-    held = free_ring(whole.body)
-    system = assemble(whole.body, held, quat, np.zeros(len(quat)), np.zeros(3), 0.0)
-    free = held.free.reshape(-1)
+    system = assemble(ring.rod, ring.supports, quat, np.zeros(len(quat)), np.zeros(3), 0.0)
+    free = ring.supports.free.reshape(-1)
     border = system.border.reshape(-1, 3)[free]
     return -np.linalg.lstsq(border, system.grad.reshape(-1)[free], rcond=None)[0]
 

@@ -21,7 +21,7 @@ import der
 from der.analysis.landscape.actuators import struts
 from der.analysis.landscape.barrier import ALIKE, twisted_rests
 from der.analysis.landscape.opening import least_push
-from der.analysis.landscape.opening_path import march
+from der.analysis.landscape.opening_path import opened
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
@@ -32,7 +32,7 @@ SECTION = der.rectangular_section(4.0)
 
 rests, alone, twisting, _ = twisted_rests(der.Scene(der.circle(), SECTION, n_edges=N_EDGES))
 lift = struts(alone[-1], (0, N_EDGES // 3))[0]
-lifted = march(lift, rests[-1].energy, ALIKE * rests[-1].energy)
+lifted = opened(lift, rests[-1].energy, ALIKE * rests[-1].energy)
 
 if __name__ == "__main__":
     place = folder("landscape_push")

@@ -25,8 +25,7 @@ import numpy as np
 
 import der
 from der.analysis.multistability.initial_guesses import covered
-from der.rod.gripped_ring import sector
-from der.rod.stability import all_modes, raw_index
+from der.rod.gripped_ring import gripped_ring
 from scenarios.output import folder, usage
 
 if __name__ == "__main__":
@@ -69,8 +68,8 @@ def ways_down(n: int, kappa0: float, alpha: float, beta: float) -> int:
 
 def index_on_mesh(n: int, kappa0: float, n_edges: int = 64) -> int:
     """The same of the discrete ring; at a threshold, by the signs of the pivots alone."""
-    alone = covered(sector(der.circle(kappa0), bar, n_edges, name="full"), n)
-    return raw_index(alone.body, alone.held, all_modes(alone.held), alone.state)
+    free = covered(gripped_ring(der.circle(kappa0), bar, n_edges, name="full"), n)
+    return free.unpinned.count(free.state, "all")
 
 
 def thresholds(n: int, index: Callable[[int, float], int]) -> Iterator[float]:

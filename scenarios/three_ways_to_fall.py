@@ -28,16 +28,14 @@ import numpy as np
 
 import der
 from der.analysis.loading import follow_angle, follow_moment
+from der.analysis.request import Request
 from der.analysis.snap import KICK, Landing
-from der.continuation.events import Wanted, visit
-from der.continuation.step import Tally
 from der.kernels.quaternions import rotation_vector
 from der.paper.snapping_rings import SNAPPING
-from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium
-from der.rod.falls import Fallen
-from der.rod.gradient_flow import flow
-from der.rod.gripped_ring import Sector, sector
-from der.rod.motion import move
+from der.problem import Increment, Statistics
+from der.rod.dynamics import EndState, flow, swing
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.rod.relaxation import Relaxed, Rest, relax
 from scenarios.output import folder, usage
 
@@ -46,8 +44,8 @@ if __name__ == "__main__":
 
 EDGES = 64
 RINGS = {"circle": (der.circle(), 1.6), **SNAPPING}
-WAYS: dict[str, Callable[..., Relaxed | Fallen]] = {"relax": relax, "flow": flow, "move": move}
-WANTED = Wanted(contacts=False)
+WAYS: dict[str, Callable[..., Relaxed | EndState]] = {"relax": relax, "flow": flow, "move": swing}
+REQUEST = Request(self_crossings=False)
 
 
 @dataclass(frozen=True)
@@ -67,44 +65,45 @@ class Fall:
     seconds: float
 
 
-def _kick(at: Equilibrium, *, load: bool) -> Direction:
+def _kick(ring: GrippedRing, at: Equilibrium, *, load: bool) -> Increment:
     """The displacement with which a fall begins."""
-    t = at.tangent
-    return Direction(KICK * t.q, 0.0 * t.force, KICK * t.load if load else 0.0)
+    kick = ring.displacement(at.tangent, KICK)
+    kick[-1] *= load
+    return kick
 
 
 def _falls(name: str) -> Iterator[Fall]:
     """Falls from both folds of a ring that is loaded and unloaded by the angle."""
-    ring, h_over_t = RINGS[name]
-    piece = sector(ring, der.rectangular_section(h_over_t), EDGES)
-    for before in follow_angle(piece, WANTED, Tally(), unload=True):
-        if before.kind != "fold":
+    shape, h_over_t = RINGS[name]
+    ring = gripped_ring(shape, der.rectangular_section(h_over_t), EDGES)
+    for point in follow_angle(ring, REQUEST, Statistics(), unload=True):
+        if point.kind != "fold":
             continue
+        before = point.solution
         first: Equilibrium | None = None
         for way, fall in WAYS.items():
             started = time.perf_counter()
-            kick = _kick(before.at, load=False)
-            found = fall(piece.body, piece.held, before.at.state, kick=kick, tolerance=1e-6)
+            kick = _kick(ring, before, load=False)
+            found = fall(ring, before.state, kick=kick, tolerance=1e-6)
             seconds = time.perf_counter() - started
-            at = equilibrium(piece.body, piece.held, found.state)
+            at = ring.correct(found.state)
             first = at if first is None else first
             yield Fall(
                 name,
-                before.at.state.load,
+                before.parameter,
                 way,
                 found.outcome,
                 at,
-                piece.moment(at.moment),
-                piece.copies * at.energy,
-                visit(piece, WANTED, at).index or (),
+                *ring.values(at)[1:],
+                REQUEST.point(ring, at).index or (),
                 float(np.abs(rotation_vector(first.state.quat, at.state.quat)).max()),
                 _cost(found),
                 seconds,
             )
 
 
-def _cost(found: Relaxed | Fallen) -> str:
-    if isinstance(found, Fallen):
+def _cost(found: Relaxed | EndState) -> str:
+    if isinstance(found, EndState):
         return f"{found.steps} steps, {found.factorisations} factorisations"
     return f"{found.evaluations} gradients"
 
@@ -115,32 +114,28 @@ def _overshoot() -> dict[str, float]:
     b/a = 0.85 about y, h/t = 4. Those that pass a stop at pi end at the folded ring, whose own
     moment, 0, is below the dead one: it stays there.
     """
-    ring, h_over_t = RINGS["ellipse"]
-    piece = sector(ring, der.rectangular_section(h_over_t), EDGES)
-    visits = list(follow_moment(piece, WANTED, Tally()))
-    landing = next(k for k, one in enumerate(visits) if isinstance(one, Landing))
-    before = visits[landing - 1].at
-    ends = {"relax": visits[landing].at.state.load}
+    shape, h_over_t = RINGS["ellipse"]
+    ring = gripped_ring(shape, der.rectangular_section(h_over_t), EDGES)
+    points = list(follow_moment(ring, REQUEST, Statistics()))
+    landing = next(k for k, one in enumerate(points) if isinstance(one, Landing))
+    before = points[landing - 1].solution
+    ends = {"relax": points[landing].solution.parameter}
     for way in ("flow", "move"):
         found = WAYS[way](
-            piece.body,
-            piece.held,
+            ring,
             before.state,
-            kick=_kick(before, load=True),
+            kick=_kick(ring, before, load=True),
             moment=before.moment,
             stops=(-np.inf, math.pi),
             tolerance=1e-6,
         )
-        ends[way] = math.pi if found.outcome is Rest.AT_STOP else _rest(piece, before, found)
+        ends[way] = math.pi if found.outcome is Rest.AT_STOP else _rest(ring, before, found)
     return ends
 
 
-def _rest(piece: Sector, before: Equilibrium, found: Relaxed | Fallen) -> float:
+def _rest(ring: GrippedRing, before: Equilibrium, found: Relaxed | EndState) -> float:
     """Gamma at rest under the moment of the state that was left."""
-    at = equilibrium(
-        piece.body, piece.held, found.state, control=Control.MOMENT, moment=before.moment
-    )
-    return at.state.load
+    return ring.correct(found.state, hold="moment", value=before.moment).parameter
 
 
 falls = [fall for name in RINGS for fall in _falls(name)]

@@ -8,18 +8,12 @@ import numpy as np
 from der.kernels.assembly import assemble
 from der.kernels.linking import unfold
 from der.kernels.quaternions import Array, rotation, turned
-from der.rod.equilibrium import (
-    ADVICE,
-    Control,
-    Direction,
-    Equilibrium,
-    equilibrium,
-    moved,
-)
-from der.rod.gripped_ring import Sector
-from der.rod.rod import Rod, State, rod
+from der.problem import PLANE
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing
+from der.rod.rod import Rod, State, discrete_rod
 from der.rod.stability import all_modes, raw_index
-from der.rod.supports import Supports
+from der.rod.system import RodSystem
 
 E1, E2, E3 = np.eye(3)
 MEASURES = ("logarithm", "angle", "tangent")
@@ -49,14 +43,14 @@ def turned_rigidly(quat: Array, w: Array) -> Array:
     return turned_all(quat, w @ rotation(quat))
 
 
-def unloaded(body: Rod, quat: Array, conditions: int, load: float = 0.0) -> State:
+def unloaded(rod: Rod, quat: Array, conditions: int, load: float = 0.0) -> State:
     """State with the given frames, no stretch and no forces yet."""
-    return State(quat, np.zeros(body.n_edges), np.zeros(conditions), load)
+    return State(quat, np.zeros(rod.n_edges), np.zeros(conditions), load)
 
 
 def straight(n_cells: int, stiffness: tuple[float, float, float], **options: object) -> Rod:
     """Open, naturally straight rod of length 1."""
-    return rod(np.full(n_cells, 1 / n_cells), np.zeros(n_cells), stiffness, **options)
+    return discrete_rod(np.full(n_cells, 1 / n_cells), np.zeros(n_cells), stiffness, **options)
 
 
 def covered_circle(
@@ -64,56 +58,48 @@ def covered_circle(
 ) -> tuple[Rod, State]:
     """Return the closed rod of length 2 pi, curved by ``kappa0``, and its n-covered circle."""
     cell = np.full(n_edges, 2 * np.pi / n_edges)
-    body = rod(cell, kappa0 * cell, stiffness, closed=True, **options)
-    return body, unloaded(body, turned_about(1, n * cell[0] * np.arange(n_edges)), 3)
+    rod = discrete_rod(cell, kappa0 * cell, stiffness, closed=True, **options)
+    return rod, unloaded(rod, turned_about(1, n * cell[0] * np.arange(n_edges)), 3)
 
 
-def solved(body: Rod, held: Supports, start: State, **options: object) -> Equilibrium:
+def solved(system: RodSystem, start: State, **options: object) -> Equilibrium:
     """Return the equilibrium from ``start``; a failed solve fails the test."""
-    found = equilibrium(body, held, start, **options)
-    assert found.converged, ADVICE[found.outcome]
+    found = system.correct(start, **options)
+    assert found.converged, found.advice
     return found
 
 
 def walk(
-    piece: Sector, length: float, stop: Callable[[Equilibrium], bool]
+    ring: GrippedRing, length: float, stop: Callable[[Equilibrium], bool]
 ) -> Iterator[Equilibrium]:
     """States on the path from the flat ring, about ``length`` apart, until ``stop`` says so."""
-    here = solved(piece.body, piece.held, piece.start)
+    here = solved(ring, ring.start)
     while True:
         yield here
         if stop(here):
             return
         ahead, t = length, here.tangent
         while True:
-            step = Direction(t.q * ahead, t.force * ahead, t.load * ahead)
-            there = equilibrium(
-                piece.body,
-                piece.held,
-                moved(piece.held, here.state, step),
-                along=t,
-                control=Control.DIRECTION,
-            )
+            there = ring.correct(ring.retract(here.state, ahead * t), along=t, hold=PLANE)
             if there.converged:
                 break
             ahead *= 0.5
-            assert ahead > 1e-6, ADVICE[there.outcome]
+            assert ahead > 1e-6, there.advice
         here = there
 
 
-def lifted(piece: Sector, state: State, onto: Sector) -> Equilibrium:
+def lifted(ring: GrippedRing, state: State, onto: GrippedRing) -> Equilibrium:
     """Return a quarter's state as an equilibrium of a half or of the full ring, at its load."""
-    quat = unfold(state.quat, piece.copies)[: onto.body.n_edges]
-    start = unloaded(onto.body, quat, len(onto.held.target), state.load)
-    return solved(onto.body, onto.held, start)
+    quat = unfold(state.quat, ring.copies)[: onto.rod.n_edges]
+    return solved(onto, unloaded(onto.rod, quat, len(onto.supports.target), state.load))
 
 
-def three_covered(piece: Sector) -> State:
+def three_covered(ring: GrippedRing) -> State:
     """Return the folded circle, gamma = pi, of a quarter: curvature 3 from the turned grip on."""
-    s = piece.arc_length
-    grip = turned_rigidly(piece.start.quat[-1:], -np.pi * E3)
+    s = ring.arc_length
+    grip = turned_rigidly(ring.start.quat[-1:], -np.pi * E3)
     quat = turned_all(np.repeat(grip, len(s), axis=0), 3 * np.outer(s - s[-1], E1))
-    return piece.start.but(quat=quat, load=np.pi)
+    return ring.start.but(quat=quat, load=np.pi)
 
 
 # --- numerics -------------------------------------------------------------------------------
@@ -127,9 +113,9 @@ def richardson(*values: float) -> float:
     return row[0]
 
 
-def index_of(body: Rod, held: Supports, state: State) -> int:
+def index_of(system: RodSystem, state: State) -> int:
     """Index of a state on all that its supports leave free, by the engine's factorisation."""
-    return raw_index(body, held, all_modes(held), state)
+    return raw_index(system.rod, system.supports, all_modes(system.supports), state)
 
 
 def first_change(index: Callable[[float], int], low: float, high: float) -> float:
@@ -143,29 +129,28 @@ def first_change(index: Callable[[float], int], low: float, high: float) -> floa
     return 0.5 * (low + high)
 
 
-def dense(
-    body: Rod, held: Supports, state: State, *, load_free: bool = False
-) -> tuple[Array, Array]:
+def dense(system: RodSystem, state: State, *, load_free: bool = False) -> tuple[Array, Array]:
     """Hessian of the Lagrangian (N, N) in the unknowns that move, and their conditions (N, n_c).
 
     With ``load_free`` the load is one more unknown, the last.
     """
-    system = assemble(body, held, state.quat, state.stretch, state.force, state.load)
-    n, b = held.free.shape
+    rod, free = system.rod, system.supports.free
+    found = assemble(rod, system.supports, state.quat, state.stretch, state.force, state.load)
+    n, b = free.shape
     hess = np.zeros((n, b, n, b))
     for j in range(n):
-        hess[j, :, j] += system.diag[j]
-    for s in range(len(body.cell)):
+        hess[j, :, j] += found.diag[j]
+    for s in range(len(rod.cell)):
         c = (s + 1) % n
-        hess[s, :, c] += system.off[s]
-        hess[c, :, s] += system.off[s].T
-    keep = held.free.ravel()
+        hess[s, :, c] += found.off[s]
+        hess[c, :, s] += found.off[s].T
+    keep = free.ravel()
     hess = hess.reshape(n * b, n * b)[np.ix_(keep, keep)]
-    border = system.border.reshape(n * b, -1)[keep]
+    border = found.border.reshape(n * b, -1)[keep]
     if load_free:
-        column = system.load_column.ravel()[keep]
-        hess = np.block([[hess, column[:, None]], [column[None, :], system.load_hess]])
-        border = np.vstack([border, system.load_border])
+        column = found.load_column.ravel()[keep]
+        hess = np.block([[hess, column[:, None]], [column[None, :], found.load_hess]])
+        border = np.vstack([border, found.load_border])
     return hess, border
 
 

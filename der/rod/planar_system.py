@@ -144,7 +144,7 @@ class PlanarRodSystem:
 
     def inner(self, a: Increment, b: Increment) -> float:
         """Return the inner product, weighted by the lengths of the edges."""
-        return float(np.sum(self._weight * a * b))
+        return float((self._weight * a) @ b)
 
     def indices(
         self, state: PlanarConfiguration, symmetry: str | None = None

@@ -10,11 +10,12 @@ import pytest
 import der
 import der.records.path
 from der.analysis.error_bars import ErrorBars, error_bars
-from der.analysis.matching import GAMMA, Family, Goal, Matched, _found, romberg
-from der.continuation.arclength import follow
-from der.continuation.events import Visit, Wanted
-from der.continuation.step import Tally
-from der.rod.gripped_ring import Sector, sector
+from der.analysis.extrapolated_curve import GAMMA, Family, Goal, Matched, _found, placed
+from der.analysis.request import Request
+from der.continuation.richardson import romberg
+from der.problem import Point
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.scene import meshes
 
 EIGHTHS = tuple(k * math.pi / 8.0 for k in range(17))
@@ -24,24 +25,34 @@ FINITE = 12.0 * der.rectangular_section(4.0).alpha * 200.0**2  # EA of a_over_t 
 @functools.cache
 def solved(
     h_over_t: float, n_edges: int, name: str = "quarter", stretching: float = 0.0, **wants: object
-) -> tuple[list[Sector], list[Visit], ErrorBars]:
-    """Sectors, visits and error bars of a circle, by default without stability and contacts."""
+) -> tuple[list[GrippedRing], list[Point[Equilibrium]], ErrorBars]:
+    """Meshes, points and error bars of a circle, by default of nothing but its path."""
     section = der.rectangular_section(h_over_t)
-    pieces = [
-        sector(der.circle(), section, n, name=name, stretching=stretching)
+    rings = [
+        gripped_ring(der.circle(), section, n, name=name, stretching=stretching)
         for n in meshes(n_edges, name)
     ]
-    wanted = Wanted(**{"stability": False, "contacts": False, **wants})
-    visits = list(follow(pieces[0], wanted, Tally()))
-    return pieces, visits, error_bars(pieces, visits, EIGHTHS)
+    request = Request(**{"stability": False, "self_crossings": False, **wants})
+    points = list(request.follow(rings[0]))
+    return rings, points, error_bars(rings, request, points)
 
 
-def kinds(visits: list[Visit], bars: ErrorBars) -> list[str]:
-    return [visits[k].kind for k in bars.order]
+def asking(*targets: float) -> Request:
+    return Request(targets=targets, stability=False, self_crossings=False)
 
 
-def is_asked(visit: Visit) -> bool:
-    return visit.kind == "" and visit.at.state.load in EIGHTHS
+def kinds(bars: ErrorBars) -> list[str]:
+    return [point.kind for point in bars.points]
+
+
+def order(points: list[Point[Equilibrium]], bars: ErrorBars) -> list[int]:
+    """Positions of the points that are kept, in path order."""
+    position = {id(point.solution): k for k, point in enumerate(points)}
+    return [position[id(point.solution)] for point in bars.points]
+
+
+def is_asked(point: Point[Equilibrium]) -> bool:
+    return point.kind == "" and point.solution.parameter in EIGHTHS
 
 
 # --- the extrapolation ------------------------------------------------------------------------
@@ -66,9 +77,9 @@ def test_last_correction_falls_with_the_fourth_power_of_the_cell(column):
     """
     largest = []
     for n in (128, 256):
-        _, visits, bars = solved(4.0, n)
-        k = kinds(visits, bars).index("limit")
-        largest.append(getattr(bars, f"{column}_error")[k])
+        _, _, bars = solved(4.0, n)
+        k = kinds(bars).index("limit")
+        largest.append(bars.error[column][k])
     assert 14.0 < largest[0] / largest[1] < 24.0
 
 
@@ -78,8 +89,8 @@ def test_rates_are_derivatives_along_the_path(place):
 
     Differences of 1e-4 err by their square, 1e-8 times third derivatives of up to 100.
     """
-    pieces, visits, _ = solved(4.0, 64)
-    family, base = Family(tuple(pieces), 1e-12), visits[place].at
+    rings, points, _ = solved(4.0, 64)
+    family, base = Family(tuple(rings), 1e-12), points[place].solution
     here, behind, ahead = family.matched(base), family.near(base, -1e-4), family.near(base, 1e-4)
     differences = (ahead.table[0, :3] - behind.table[0, :3]) / 2e-4
     assert here.table[0, 3:] == pytest.approx(differences, abs=1e-6)
@@ -93,8 +104,8 @@ def test_sectors_agree(name):
     """
     _, _, quarter = solved(1.6, 64)
     _, _, other = solved(1.6, 64, name)
-    assert other.gamma == pytest.approx(quarter.gamma, abs=1e-8)
-    assert other.moment == pytest.approx(quarter.moment, abs=1e-8)
+    for name in ("gamma", "moment"):
+        assert other.values[name] == pytest.approx(quarter.values[name], abs=1e-8)
 
 
 def test_extensible_ring_has_error_bars():
@@ -111,25 +122,24 @@ def test_extensible_ring_has_error_bars():
 
 def test_gamma_that_was_asked_for_stays_to_the_last_digit():
     """At multiples of pi/8, pi among them, gamma is what was asked, and its error is 0."""
-    _, visits, bars = solved(4.0, 128)
-    at = [i for i, k in enumerate(bars.order) if is_asked(visits[k])]
-    assert bars.gamma[at].tolist() == list(EIGHTHS[:9])
-    assert {bars.gamma_error[i] for i in at} == {0.0}
+    _, _, bars = solved(4.0, 128)
+    at = [i for i, point in enumerate(bars.points) if is_asked(point)]
+    assert bars.values["gamma"][at].tolist() == list(EIGHTHS[:9])
+    assert {bars.error["gamma"][i] for i in at} == {0.0}
 
 
 def test_state_that_was_not_asked_for_lies_in_place():
     """Without anything asked for, gamma moves: the raw gamma of 64 edges is off by up to 4e-3."""
-    pieces, visits, _ = solved(4.0, 64)
-    bars = error_bars(pieces, visits, ())
-    assert 1e-3 < np.abs(bars.gamma - bars.raw["gamma"]).max() < 2e-2
+    rings, points, _ = solved(4.0, 64)
+    bars = error_bars(rings, asking(), points)
+    assert 1e-3 < np.abs(bars.values["gamma"] - bars.raw["gamma"]).max() < 2e-2
 
 
 def test_raw_values_are_those_of_the_visits():
     """``raw`` is the path on N edges, state by state, energies of the full ring."""
-    _, visits, bars = solved(1.6, 64)
-    expected = [4.0 * visits[k].at.energy for k in bars.order]
-    assert bars.raw["energy"] == expected
-    assert len(bars.raw["moment"]) == len(bars.raw["gamma"]) == len(bars.gamma)
+    _, _, bars = solved(1.6, 64)
+    assert bars.raw["energy"] == [4.0 * point.solution.energy for point in bars.points]
+    assert len(bars.raw["moment"]) == len(bars.raw["gamma"]) == len(bars.points)
 
 
 @pytest.mark.parametrize("n_edges", [32, 48, 64, 128])
@@ -138,9 +148,10 @@ def test_order_of_the_path_is_kept(n_edges):
 
     On 32 edges folds and limits move past four states that nobody asked for: those are left out.
     """
-    _, visits, bars = solved(1.6, n_edges)
-    first, second = (i for i, kind in enumerate(kinds(visits, bars)) if kind == "fold")
-    up, down, again = bars.gamma[: first + 1], bars.gamma[first : second + 1], bars.gamma[second:]
+    _, _, bars = solved(1.6, n_edges)
+    first, second = (i for i, kind in enumerate(kinds(bars)) if kind == "fold")
+    gamma = bars.values["gamma"]
+    up, down, again = gamma[: first + 1], gamma[first : second + 1], gamma[second:]
     assert np.all(np.diff(up) > 0.0)
     assert np.all(np.diff(down) < 0.0)
     assert np.all(np.diff(again) > 0.0)
@@ -148,43 +159,60 @@ def test_order_of_the_path_is_kept(n_edges):
 
 def test_only_states_that_nobody_asked_for_are_left_out():
     """On 32 edges at h/t = 1.6 states are overtaken; all asked ones and special points are kept."""
-    _, visits, bars = solved(1.6, 32)
-    missing = [visit for k, visit in enumerate(visits) if k not in bars.order]
+    _, points, bars = solved(1.6, 32)
+    kept = order(points, bars)
+    missing = [point for k, point in enumerate(points) if k not in kept]
     assert missing
-    assert not any(visit.kind or is_asked(visit) for visit in missing)
+    assert not any(point.kind or is_asked(point) for point in missing)
 
 
 def test_moment_is_stationary_at_a_limit():
     """The record's limit is the summit of the extrapolated curve: its neighbours lie below."""
-    _, visits, bars = solved(4.0, 128)
-    k = kinds(visits, bars).index("limit")
-    assert bars.moment[k] > max(bars.moment[k - 1], bars.moment[k + 1])
+    _, _, bars = solved(4.0, 128)
+    k, moment = kinds(bars).index("limit"), bars.values["moment"]
+    assert moment[k] > max(moment[k - 1], moment[k + 1])
 
 
 # --- what is not known ------------------------------------------------------------------------
 
 
 def test_state_that_a_mesh_lacks_is_null_and_said_so():
-    """8 edges have no counterpart to the far loop of h/t = 1: null there, and values of N edges."""
-    _, visits, bars = solved(1.0, 32, load_max=math.inf, until_folded=True)
-    lost = [i for i, error in enumerate(bars.moment_error) if error is None]
+    """8 edges have no counterpart to the last states of h/t = 0.7: null, and values of N edges."""
+    _, _, bars = solved(0.7, 32, gamma_max=5.0)
+    lost = [i for i, error in enumerate(bars.error["moment"]) if error is None]
     assert lost
-    assert [bars.gamma[i] for i in lost] == [visits[bars.order[i]].at.state.load for i in lost]
-    assert f"null at {len(lost)} of {len(bars.order)} states" in bars.how
+    raw = [bars.points[i].solution.parameter for i in lost]
+    assert bars.values["gamma"][lost].tolist() == raw
+    assert f"null at {len(lost)} of {len(bars.points)} states" in bars.error["how"]
 
 
-def test_gamma_beyond_the_fold_of_the_extrapolated_curve_is_null():
-    """A gamma between the fold of 64 edges and that of the extrapolated curve has no state there.
+def test_path_that_the_coarsest_mesh_does_not_follow_has_no_errors():
+    """8 edges have no counterpart to the far loop of h/t = 1, and their path ends: all is null."""
+    _, points, bars = solved(1.0, 32, gamma_max=math.inf, until_folded=True)
+    assert list(bars.points) == points
+    assert bars.values["moment"].tolist() == bars.raw["moment"]
+    assert set(bars.error["moment"]) == {None}
+    assert "on 8 edges the path cannot be followed to an end" in bars.error["how"]
+
+
+def test_gamma_beyond_the_fold_of_the_extrapolated_curve_has_no_state():
+    """A gamma between the fold of 64 edges and that of the extrapolated curve is left out.
 
     At h/t = 1.6 the second fold lies at 2.61197 on 64 edges and at 2.61372 extrapolated.
     """
-    pieces, _, _ = solved(1.6, 64)
-    wanted = Wanted(targets=(2.6130,), stability=False, contacts=False)
-    visits = list(follow(pieces[0], wanted, Tally()))
-    bars = error_bars(pieces, visits, (0.0, 2.6130, math.pi))
-    found = [i for i, k in enumerate(bars.order) if visits[k].at.state.load == 2.6130]
-    near = [bars.moment_error[i] for i in found if 1.0 < bars.raw["moment"][i] < 1.2]
-    assert near == [None, None]
+    rings, _, _ = solved(1.6, 64)
+    request = asking(2.6130)
+    points = list(request.follow(rings[0]))
+    family = Family(tuple(rings), request.tolerance)
+    near = [
+        point
+        for point in points
+        if point.solution.parameter == 2.6130
+        and 1.0 < rings[0].arm_moment(point.solution.moment) < 1.2
+    ]
+    assert list(placed(family, near, (2.6130,))) == [None, None]
+    kept = {id(point.solution) for point in error_bars(rings, request, points).points}
+    assert kept.isdisjoint(id(point.solution) for point in near)
 
 
 def test_states_without_values_stay_among_their_neighbours():
@@ -193,17 +221,18 @@ def test_states_without_values_stay_among_their_neighbours():
     The extrapolated fold at h/t = 1.6 lies 5e-3 further, too far for Newton's method from a state
     where gamma hardly changes, so that they have no errors.
     """
-    pieces, visits, _ = solved(1.6, 64)
-    fold = next(visit.at.state.load for visit in visits if visit.kind == "fold")
+    rings, points, _ = solved(1.6, 64)
+    fold = next(point.solution.parameter for point in points if point.kind == "fold")
     asked = fold - 1e-7
-    wanted = Wanted(targets=(asked,), stability=False, contacts=False)
-    visits = list(follow(pieces[0], wanted, Tally()))
-    bars = error_bars(pieces, visits, (0.0, asked, math.pi))
+    request = asking(asked)
+    points = list(request.follow(rings[0]))
     special = [
-        k for k in bars.order if visits[k].kind == "fold" or visits[k].at.state.load == asked
+        k
+        for k in order(points, error_bars(rings, request, points))
+        if points[k].kind == "fold" or points[k].solution.parameter == asked
     ]
     assert special == sorted(special)
-    assert [visits[k].kind for k in special[:3]] == ["", "fold", ""]
+    assert [points[k].kind for k in special[:3]] == ["", "fold", ""]
 
 
 def test_gamma_is_not_sought_round_a_fold():
@@ -217,38 +246,32 @@ def test_gamma_is_not_sought_round_a_fold():
     assert _found(Goal(GAMMA, 0.0, direction=-1.0), 0.0, here, 1.0, bend) is None
 
 
-def test_contact_points_have_no_errors():
+def test_self_crossings_have_no_errors():
     """They are placed on N edges only: values on the extrapolated curve, errors null."""
-    _, visits, bars = solved(4.0, 64, contacts=True)
-    at = kinds(visits, bars).index("contact")
-    assert bars.gamma_error[at] is None
-    assert "contact" in bars.how
+    _, _, bars = solved(4.0, 64, self_crossings=True)
+    at = kinds(bars).index("contact")
+    assert bars.error["gamma"][at] is None
+    assert "contact" in bars.error["how"]
 
 
 def test_how_names_the_meshes():
     """A reader of the record learns where the numbers come from."""
-    assert "128, 64, 32 edges" in solved(4.0, 128)[2].how
+    assert "128, 64, 32 edges" in solved(4.0, 128)[2].error["how"]
 
 
 def test_path_that_never_reached_pi_has_no_slope_there():
     """A path to gamma = 1 ends without a slope at pi."""
-    _, _, bars = solved(4.0, 64, load_max=1.0)
+    _, _, bars = solved(4.0, 64, gamma_max=1.0)
     assert bars.slope is None
-    assert bars.slope_error is None
-
-
-def test_path_without_states():
-    """A path that was interrupted at once has empty error bars."""
-    pieces, _, _ = solved(4.0, 64)
-    assert error_bars(pieces, [], EIGHTHS).gamma.shape == (0,)
+    assert bars.error["slope_at_pi"] is None
 
 
 def test_error_fits_the_record():
     """A record takes the arrays, the errors and the raw values, and comes back from its JSON."""
     _, _, bars = solved(4.0, 128)
     path = der.fold(der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=128))
-    none = der.records.path.counts([None] * len(bars.order))
-    entries = {name: getattr(bars, name) for name in ("gamma", "moment", "energy", "error", "raw")}
+    none = der.records.path.counts([None] * len(bars.points))
+    entries = {**bars.values, "error": bars.error, "raw": bars.raw}
     path = dataclasses.replace(path, index=none, index_moment=none, points=(), **entries)
     again = der.Path.from_json(path.to_json())
     assert again.error == bars.error

@@ -3,7 +3,8 @@
 import math
 import pathlib
 import signal
-from functools import cache, partial
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ import pytest
 import der
 import der.analysis.curve_distance
 import der.analysis.fold
-from der.continuation.step import Stuck
+from der.analysis.request import Request
+from der.errors import ContinuationFailed, Reason
 
 EIGHTH = math.pi / 8
 
@@ -89,9 +91,13 @@ def test_contacts_are_not_looked_for_where_not_asked_for():
 def stuck(monkeypatch):
     """Paths stop after six steps; kernels have been loaded before."""
     folded()
-    monkeypatch.setattr(
-        der.analysis.fold, "Wanted", partial(der.analysis.fold.Wanted, most_steps=6)
-    )
+    usual = der.analysis.fold._request
+
+    def of_six_steps(scene):
+        request = usual(scene)
+        return replace(request, options=replace(request.options, max_steps=6))
+
+    monkeypatch.setattr(der.analysis.fold, "_request", of_six_steps)
 
 
 def test_what_cannot_be_followed_is_handed_over(stuck):
@@ -181,11 +187,11 @@ def singular(monkeypatch):
     """Not even the flat ring is found."""
 
     def follow(*_):
-        raise Stuck("the flat ring is no equilibrium")
+        raise ContinuationFailed("the flat ring is no equilibrium", Reason.NO_START)
         yield
 
     folded()
-    monkeypatch.setattr(der.analysis.fold, "follow", follow)
+    monkeypatch.setattr(Request, "follow", follow)
 
 
 def test_a_path_without_a_state_has_a_record(singular):

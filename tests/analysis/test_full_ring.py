@@ -1,4 +1,4 @@
-"""What is kept of the full ring: shapes, falls and softest modes, from the states of a sector."""
+"""What is kept of the full ring: shapes, snaps and softest modes, from the states of a sector."""
 
 from itertools import pairwise
 
@@ -8,83 +8,78 @@ from numpy.testing import assert_allclose
 
 import der
 from der.analysis.full_ring import STEPS, displacements
-from der.continuation.arclength import follow
-from der.continuation.events import Wanted
-from der.continuation.step import Tally
+from der.analysis.request import Request
 from der.kernels.linking import unfold
-from der.rod.equilibrium import Direction, equilibrium, moved
-from der.rod.gripped_ring import sector
-from der.rod.stability import softest_modes
+from der.rod.gripped_ring import gripped_ring
 
 EDGES = 32
 
 
-def ring(name, **more):
-    return sector(der.circle(), der.rectangular_section(1.6), EDGES, name=name, **more)
+def circle(name, **more):
+    return gripped_ring(der.circle(), der.rectangular_section(1.6), EDGES, name=name, **more)
 
 
 @pytest.fixture(scope="module", params=[0.0, 1e3], ids=["inextensible", "extensible"])
 def states(request):
     """A quarter, and a state on its unstable branch; and the same on a half and the full ring."""
     quarter, *others = (
-        ring(name, stretching=request.param) for name in ("quarter", "half", "full")
+        circle(name, stretching=request.param) for name in ("quarter", "half", "full")
     )
-    visits = follow(quarter, Wanted(), Tally())
-    at = next(visit.at for visit in visits if not visit.kind and sum(visit.index) == 1)
+    points = Request().follow(quarter)
+    at = next(point.solution for point in points if not point.kind and sum(point.index) == 1)
     found = [(quarter, at.state)]
     frames, lengths = quarter.full_frames(at.state), quarter.full_lengths(at.state)
-    for piece in others:
-        n = len(piece.start.quat)
+    for ring in others:
+        n = len(ring.start.quat)
         stretch = lengths[:n] / (2 * np.pi / EDGES) - 1.0
-        guess = piece.start.but(
+        guess = ring.start.but(
             quat=np.ascontiguousarray(frames[:n]), stretch=stretch, load=at.state.load
         )
-        found.append((piece, equilibrium(piece.body, piece.held, guess).state))
+        found.append((ring, ring.correct(guess).state))
     return found
 
 
-def softest(piece, state, label, count=1):
+def softest(ring, state, label, count=1):
     """Eigenvalues and displacements of the softest modes of a class."""
-    values, modes = softest_modes(piece.body, piece.held, piece.classes[label][1], state, count)
-    return values, [displacements(piece, state, label, mode) for mode in modes]
+    values, modes = ring.softest_modes(state, count, label)
+    return values, [displacements(ring, state, label, mode) for mode in modes]
 
 
 @pytest.mark.parametrize("label", ["in phase", "odd"])
 def test_modes_of_a_sector_are_modes_of_the_full_ring(states, label):
     """The same eigenvalue, and a displacement in the span of the full ring's own softest modes."""
-    whole_values, whole = softest(*states[2], "all", 3)
-    for piece, state in states[:2]:
-        label_here = {"odd": "out of phase"}.get(label, label) if piece.copies == 2 else label
-        (value,), (u,) = softest(piece, state, label_here)
-        assert np.abs(whole_values - value).min() < 1e-8
-        basis = np.reshape(whole, (3, -1)).T
+    full_values, full = softest(*states[2], "all", 3)
+    for ring, state in states[:2]:
+        label_here = {"odd": "out of phase"}.get(label, label) if ring.copies == 2 else label
+        (value,), (u,) = softest(ring, state, label_here)
+        assert np.abs(full_values - value).min() < 1e-8
+        basis = np.reshape(full, (3, -1)).T
         best, *_ = np.linalg.lstsq(basis, u.ravel(), rcond=None)
         assert_allclose(basis @ best, u.ravel(), atol=1e-6 * np.abs(u).max())
 
 
 def test_displacement_is_the_rate_of_the_shape(states):
     """Central differences along an in-phase mode, which the sector itself can follow."""
-    for piece, state in states:
-        label, (_, modes) = next(iter(piece.classes.items()))
-        _, (mode,) = softest_modes(piece.body, piece.held, modes, state)
-        shift = Direction(1e-4 * mode, np.zeros_like(state.force), 0.0)
-        back = shift._replace(q=-shift.q)
-        ends = [piece.shape(moved(piece.held, state, way))[0] for way in (shift, back)]
+    for ring, state in states:
+        label = next(iter(ring.classes))
+        _, (mode,) = ring.softest_modes(state, symmetry=label)
+        shift = ring.increment(1e-4 * mode)
+        ends = [ring.shape(ring.retract(state, way))[0] for way in (shift, -shift)]
         rate = (ends[0] - ends[1]) / 2e-4
-        assert_allclose(displacements(piece, state, label, mode), rate, atol=1e-6)
+        assert_allclose(displacements(ring, state, label, mode), rate, atol=1e-6)
 
 
 @pytest.mark.parametrize("label", ["in phase", "out of phase", "odd"])
 def test_every_class_keeps_the_ring_closed_and_the_grips_on_their_axis(states, label):
     """Displacements of the grips' middles have no component across E3, and opposite ones along."""
-    piece, state = states[0]
-    _, (u,) = softest(piece, state, label)
+    ring, state = states[0]
+    _, (u,) = softest(ring, state, label)
     grips = 0.5 * (u + np.roll(u, 1, axis=0))[[0, EDGES // 2]]
     assert_allclose(grips[:, :2], 0.0, atol=1e-8 * np.abs(u).max())
     assert_allclose(grips.sum(axis=0), 0.0, atol=1e-8 * np.abs(u).max())
 
 
-def test_the_pieces_above_are_at_one_state(states):
+def test_the_rings_above_are_at_one_state(states):
     """Newton moved nothing of the quarter's unfolded frames."""
     (_, state), _, (_, same) = states
     assert_allclose(np.abs(np.sum(unfold(state.quat, 4) * same.quat, axis=1)), 1.0, atol=1e-12)

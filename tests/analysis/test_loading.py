@@ -12,13 +12,13 @@ from rods import solved
 import der
 from der.analysis.loading import follow_angle, follow_moment
 from der.analysis.loading_by_relaxation import RESOLUTION, RISE, _Walk, follow_relaxed
+from der.analysis.request import Request
+from der.analysis.secant import ahead, is_work, longer, rested, went_on
 from der.analysis.snap import Landing
-from der.analysis.trail import ahead, is_work, longer, rested, went_on
-from der.continuation.arclength import follow
-from der.continuation.events import Visit, Wanted
-from der.continuation.step import Stuck, Tally
-from der.rod.gripped_ring import Sector, sector
-from der.rod.stability import all_modes, index
+from der.errors import ContinuationFailed
+from der.problem import Point, Statistics
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 
 FOLLOWERS = {"angle": follow_angle, "moment": follow_moment, "relaxed": follow_relaxed}
 
@@ -26,27 +26,27 @@ FOLLOWERS = {"angle": follow_angle, "moment": follow_moment, "relaxed": follow_r
 @functools.cache
 def marched(
     follower: str, h_over_t: float, name: str = "quarter", gamma_max: float = math.pi, **options
-) -> tuple[Sector, tuple[Visit, ...]]:
-    """Return the sector of a circle of 64 edges and the visits of a march without contacts."""
-    piece = sector(der.circle(), der.rectangular_section(h_over_t), 64, name=name)
-    wanted = Wanted(contacts=False, load_max=gamma_max)
-    return piece, tuple(FOLLOWERS[follower](piece, wanted, Tally(), **options))
+) -> tuple[GrippedRing, tuple[Point[Equilibrium], ...]]:
+    """Return a gripped circle of 64 edges and the points of a march without self-crossings."""
+    ring = gripped_ring(der.circle(), der.rectangular_section(h_over_t), 64, name=name)
+    request = Request(self_crossings=False, gamma_max=gamma_max)
+    return ring, tuple(FOLLOWERS[follower](ring, request, Statistics(), **options))
 
 
 @functools.cache
-def path(h_over_t: float, *targets: float) -> tuple[Visit, ...]:
+def path(h_over_t: float, *targets: float) -> tuple[Point[Equilibrium], ...]:
     """States of the arclength path of the quarter of 64 edges, at ``targets`` and in between."""
-    piece = sector(der.circle(), der.rectangular_section(h_over_t), 64)
-    wanted = Wanted(contacts=False, targets=targets or None)
-    return tuple(follow(piece, wanted, Tally()))
+    ring = gripped_ring(der.circle(), der.rectangular_section(h_over_t), 64)
+    request = Request(self_crossings=False, targets=targets or None)
+    return tuple(request.follow(ring))
 
 
-def of_kind(visits: tuple[Visit, ...], kind: str) -> list[Visit]:
-    return [visit for visit in visits if visit.kind == kind]
+def of_kind(points: tuple[Point[Equilibrium], ...], kind: str) -> list[Point[Equilibrium]]:
+    return [point for point in points if point.kind == kind]
 
 
-def loads(visits: tuple[Visit, ...]) -> list[float]:
-    return [visit.at.state.load for visit in visits]
+def loads(points: tuple[Point[Equilibrium], ...]) -> list[float]:
+    return [point.solution.parameter for point in points]
 
 
 # --- angle ------------------------------------------------------------------------------------
@@ -58,8 +58,8 @@ def test_the_ring_snaps_at_the_fold_of_the_path(name):
 
     The goal is 1e-6 rad; both solve dgamma/ds = 0, measured 1e-12 apart.
     """
-    _, visits = marched("angle", 1.6, name, unload=True)
-    ends = loads(of_kind(visits, "fold"))
+    _, points = marched("angle", 1.6, name, unload=True)
+    ends = loads(of_kind(points, "fold"))
     folds = loads(of_kind(path(1.6), "fold"))
     assert len(ends) == len(folds) == 2
     assert np.abs(np.subtract(ends, folds)).max() < 1e-9
@@ -68,26 +68,26 @@ def test_the_ring_snaps_at_the_fold_of_the_path(name):
 @pytest.mark.parametrize("name", ["quarter", "full"])
 def test_every_state_between_snaps_is_a_minimum(name):
     """Index 0 in every class at every state, but where it is about to snap (unknown there)."""
-    _, visits = marched("angle", 1.6, name, unload=True)
-    assert all(set(visit.index or (0,)) == {0} for visit in visits)
-    assert sum(visit.index is None for visit in visits) == 2
+    _, points = marched("angle", 1.6, name, unload=True)
+    assert all(set(point.index or (0,)) == {0} for point in points)
+    assert sum(point.index is None for point in points) == 2
 
 
 def test_a_ring_without_folds_is_followed_as_by_arclength():
     """At h/t = 4 all ways to march give the same states at the multiples of pi/8, to 1e-9."""
-    piece, visits = marched("angle", 4.0)
-    here = {visit.at.state.load: visit.at for visit in visits}
-    there = {visit.at.state.load: visit.at for visit in path(4.0)}
+    ring, points = marched("angle", 4.0)
+    here = {point.solution.parameter: point.solution for point in points}
+    there = {point.solution.parameter: point.solution for point in path(4.0)}
     for k in range(9):
         gamma = k * math.pi / 8
-        assert abs(piece.moment(here[gamma].moment - there[gamma].moment)) < 1e-9
-    assert not of_kind(visits, "snap")
+        assert abs(ring.arm_moment(here[gamma].moment - there[gamma].moment)) < 1e-9
+    assert not of_kind(points, "snap")
 
 
 def test_gamma_grows_and_ends_at_its_last_value_and_unloading_at_zero():
     """Loading never turns back, not even in a snap; it ends at pi exactly, unloading at 0."""
-    _, visits = marched("angle", 1.6, unload=True)
-    gamma = np.array(loads(visits))
+    _, points = marched("angle", 1.6, unload=True)
+    gamma = np.array(loads(points))
     top = int(np.argmax(gamma))
     assert gamma[top] == math.pi
     assert gamma[-1] == 0.0
@@ -101,46 +101,46 @@ def test_small_snaps_end_and_are_not_repeated(h_over_t):
 
     There the valley from the fold to the landing is nearly level, and steep across where stiff.
     """
-    _, visits = marched("angle", h_over_t, unload=True)
-    landings = of_kind(visits, "snap")
+    _, points = marched("angle", h_over_t, unload=True)
+    landings = of_kind(points, "snap")
     assert len(landings) == 2
     assert all(landing.details["energy_released"] > 0.0 for landing in landings)
 
 
 def test_unloading_from_the_folded_ring_begins_without_a_contact():
     """Three strands that lie in each other have no linking number to change from."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 64)
-    visits = tuple(follow_angle(piece, Wanted(stability=False), Tally(), unload=True))
-    assert max(loads(of_kind(visits, "contact"))) < math.pi - 0.01
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 64)
+    points = tuple(follow_angle(ring, Request(stability=False), Statistics(), unload=True))
+    assert max(loads(of_kind(points, "contact"))) < math.pi - 0.01
 
 
 def test_states_asked_for_are_solved_for():
     """`targets` are met to the last bit, before and after a snap."""
-    piece = sector(der.circle(), der.rectangular_section(1.6), 32)
-    wanted = Wanted(contacts=False, stability=False, targets=(0.1, 2.3, 3.0))
-    gamma = loads(tuple(follow_angle(piece, wanted, Tally())))
+    ring = gripped_ring(der.circle(), der.rectangular_section(1.6), 32)
+    request = Request(self_crossings=False, stability=False, targets=(0.1, 2.3, 3.0))
+    gamma = loads(tuple(follow_angle(ring, request, Statistics())))
     assert {0.1, 2.3, 3.0, math.pi} <= set(gamma)
 
 
 def test_a_sector_says_when_its_symmetry_breaks():
     """At h/t = 0.6 an odd mode goes soft before the quarter's own fold: it cannot follow it."""
-    piece = sector(der.circle(), der.rectangular_section(0.6), 64)
+    ring = gripped_ring(der.circle(), der.rectangular_section(0.6), 64)
     found = []
-    with pytest.raises(Stuck, match=r"breaks the symmetry of its quarter.*'full'"):
-        found.extend(follow_angle(piece, Wanted(contacts=False, load_max=6.0), Tally()))
+    with pytest.raises(ContinuationFailed, match=r"breaks the symmetry of its quarter.*'full'"):
+        found.extend(follow_angle(ring, Request(self_crossings=False, gamma_max=6.0), Statistics()))
 
 
 @pytest.mark.parametrize("stability", [True, False])
 def test_the_full_ring_falls_off_a_branch_point(stability):
     """The full ring leaves its symmetric path there, for a minimum, asked for stability or not."""
-    piece = sector(der.circle(), der.rectangular_section(0.6), 64, name="full")
-    wanted = Wanted(contacts=False, load_max=5.0, stability=stability)
-    visits = tuple(follow_angle(piece, wanted, Tally()))
-    (branch,), (landing,) = of_kind(visits, "branch"), of_kind(visits, "snap")
-    assert landing.details["gamma_fold"] == branch.at.state.load
+    ring = gripped_ring(der.circle(), der.rectangular_section(0.6), 64, name="full")
+    request = Request(self_crossings=False, gamma_max=5.0, stability=stability)
+    points = tuple(follow_angle(ring, request, Statistics()))
+    (branch,), (landing,) = of_kind(points, "branch"), of_kind(points, "snap")
+    assert landing.details["gamma_fold"] == branch.solution.parameter
     assert landing.details["energy_released"] > 1e-6
-    assert index(piece.body, piece.held, all_modes(piece.held), landing.at.state) == 0
-    assert (visits[-1].index is None) is not stability
+    assert ring.index(landing.solution.state) == 0
+    assert (points[-1].index is None) is not stability
 
 
 def test_the_full_ring_leaves_a_branch_point_along_its_mode_of_negative_stiffness():
@@ -148,13 +148,13 @@ def test_the_full_ring_leaves_a_branch_point_along_its_mode_of_negative_stiffnes
 
     Past it a mode of small positive stiffness is nearer to zero than the one that is a way down.
     """
-    ring, section = der.ellipse(0.5425345743524903), der.rectangular_section(1.3259928102023317)
-    piece = sector(ring, section, 128, name="full")
-    visits = tuple(follow_angle(piece, Wanted(contacts=False, stability=False), Tally()))
-    (branch,), (landing,) = of_kind(visits, "branch"), of_kind(visits, "snap")
-    assert branch.at.state.load == pytest.approx(3.0052, abs=1e-3)
+    shape, section = der.ellipse(0.5425345743524903), der.rectangular_section(1.3259928102023317)
+    ring = gripped_ring(shape, section, 128, name="full")
+    points = tuple(follow_angle(ring, Request(self_crossings=False, stability=False), Statistics()))
+    (branch,), (landing,) = of_kind(points, "branch"), of_kind(points, "snap")
+    assert branch.solution.parameter == pytest.approx(3.0052, abs=1e-3)
     assert landing.details["energy_released"] == pytest.approx(0.554, abs=0.01)
-    assert index(piece.body, piece.held, all_modes(piece.held), landing.at.state) == 0
+    assert ring.index(landing.solution.state) == 0
 
 
 def test_a_branch_that_returns_to_its_symmetric_path_is_followed_back():
@@ -163,23 +163,23 @@ def test_a_branch_that_returns_to_its_symmetric_path_is_followed_back():
     Coming back, the branch ends where it began: a branch point, no fold, and the ring goes on
     without a snap, to the flat ring, as it came.
     """
-    piece = sector(der.ellipse(0.7419), der.rectangular_section(1.36064), 64, name="full")
-    wanted = Wanted(contacts=False, stability=False)
-    visits = tuple(follow_angle(piece, wanted, Tally(), unload=True))
-    up, down = of_kind(visits, "branch")
-    assert down.at.state.load == pytest.approx(up.at.state.load, abs=1e-6)
-    assert down.at.moment == pytest.approx(up.at.moment, abs=1e-4)
-    assert len(of_kind(visits, "snap")) == 1
-    assert not of_kind(visits, "fold")
-    assert visits[-1].at.state.load == 0.0
+    ring = gripped_ring(der.ellipse(0.7419), der.rectangular_section(1.36064), 64, name="full")
+    request = Request(self_crossings=False, stability=False)
+    points = tuple(follow_angle(ring, request, Statistics(), unload=True))
+    up, down = of_kind(points, "branch")
+    assert down.solution.parameter == pytest.approx(up.solution.parameter, abs=1e-6)
+    assert down.solution.moment == pytest.approx(up.solution.moment, abs=1e-4)
+    assert len(of_kind(points, "snap")) == 1
+    assert not of_kind(points, "fold")
+    assert points[-1].solution.parameter == 0.0
 
 
 def test_a_march_does_not_start_from_a_saddle():
     """A state with a way down is refused, with a sentence."""
-    between = next(visit for visit in path(1.6) if visit.index == (1, 0, 0))
-    piece = sector(der.circle(), der.rectangular_section(1.6), 64)
-    with pytest.raises(Stuck, match="no minimum"):
-        next(follow_angle(piece, Wanted(), Tally(), start=between.at))
+    between = next(point for point in path(1.6) if point.index == (1, 0, 0))
+    ring = gripped_ring(der.circle(), der.rectangular_section(1.6), 64)
+    with pytest.raises(ContinuationFailed, match="no minimum"):
+        next(follow_angle(ring, Request(), Statistics(), start=between.solution.state))
 
 
 # --- dead moment ------------------------------------------------------------------------------
@@ -189,9 +189,9 @@ def test_a_march_does_not_start_from_a_saddle():
 @pytest.mark.parametrize("h_over_t", [1.0, 4.0])
 def test_a_dead_moment_snaps_at_the_limit_of_the_path(h_over_t, name):
     """Stability ends where dM/ds = 0 on the arclength path, to 1e-9 rad."""
-    _, visits = marched("moment", h_over_t, name)
+    _, points = marched("moment", h_over_t, name)
     limit = of_kind(path(h_over_t), "limit")[0]
-    assert abs(loads(of_kind(visits, "limit"))[0] - limit.at.state.load) < 1e-9
+    assert abs(loads(of_kind(points, "limit"))[0] - limit.solution.parameter) < 1e-9
 
 
 def test_a_snap_through_lands_at_the_same_moment():
@@ -199,66 +199,68 @@ def test_a_snap_through_lands_at_the_same_moment():
 
     And on the path: a state of the arclength path at that gamma has that moment.
     """
-    piece, visits = marched("moment", 1.6)
-    landing = of_kind(visits, "snap")[0]
-    gamma = landing.at.state.load
+    ring, points = marched("moment", 1.6)
+    landing = of_kind(points, "snap")[0]
+    gamma = landing.solution.parameter
     assert gamma < math.pi
     assert abs(landing.details["moment_after"] - landing.details["moment_before"]) < 1e-9
-    met = [v.at for v in path(1.6, gamma) if v.at.state.load == gamma]
-    assert min(abs(piece.moment(at.moment - landing.at.moment)) for at in met) < 1e-9
+    met = [v.solution for v in path(1.6, gamma) if v.solution.parameter == gamma]
+    assert min(abs(ring.arm_moment(at.moment - landing.solution.moment)) for at in met) < 1e-9
 
 
 def test_a_snap_through_is_stopped_at_gamma_max():
     """At h/t = 4 nothing below pi holds the moment of the peak: gamma ends at pi, M there 0."""
-    piece, visits = marched("moment", 4.0)
-    assert visits[-1].kind == "snap"
-    assert visits[-1].at.state.load == math.pi
-    assert abs(piece.moment(visits[-1].at.moment)) < 1e-9
+    ring, points = marched("moment", 4.0)
+    assert points[-1].kind == "snap"
+    assert points[-1].solution.parameter == math.pi
+    assert abs(ring.arm_moment(points[-1].solution.moment)) < 1e-9
 
 
 def test_a_stop_that_is_only_overrun_does_not_hold_the_ring():
     """A stop at 2.43, just past the landing at 2.4206: the motion hits it, and comes back."""
     _, (*_, free) = marched("moment", 1.6, gamma_max=2.42)
-    assert free.at.state.load == 2.42
+    assert free.solution.parameter == 2.42
     landing = of_kind(marched("moment", 1.6)[1], "snap")[0]
     stopped = of_kind(marched("moment", 1.6, gamma_max=2.43)[1], "snap")[0]
-    assert abs(stopped.at.state.load - landing.at.state.load) < 1e-8
+    assert abs(stopped.solution.parameter - landing.solution.parameter) < 1e-8
 
 
 def test_a_ring_that_rests_shortly_before_its_stop_is_found_there():
     """A triangle whose state of rest lies 5e-4 rad before the stop that its motion runs into."""
-    ring = der.triangle(math.radians(75.075517148597), 0.052288041382129474)
-    piece = sector(ring, der.rectangular_section(1.1323602434456281), 128)
-    visits = tuple(follow_moment(piece, Wanted(contacts=False, stability=False), Tally()))
-    (landing,) = of_kind(visits, "snap")
-    assert 1e-4 < math.pi - landing.at.state.load < 1e-3
+    shape = der.triangle(math.radians(75.075517148597), 0.052288041382129474)
+    ring = gripped_ring(shape, der.rectangular_section(1.1323602434456281), 128)
+    points = tuple(
+        follow_moment(ring, Request(self_crossings=False, stability=False), Statistics())
+    )
+    (landing,) = of_kind(points, "snap")
+    assert 1e-4 < math.pi - landing.solution.parameter < 1e-3
     assert landing.details["moment_after"] == pytest.approx(landing.details["moment_before"])
-    assert loads(visits)[-1] == math.pi
+    assert loads(points)[-1] == math.pi
 
 
 def test_the_dead_moment_only_grows():
     """Between snaps every state is at a higher moment than the last, at stable equilibrium."""
-    _, visits = marched("moment", 1.6)
+    _, points = marched("moment", 1.6)
     rises = [
-        b.at.moment - a.at.moment
-        for a, b in pairwise(visits)
-        if b.at.state.load < math.pi and b.kind != "snap"
+        b.solution.moment - a.solution.moment
+        for a, b in pairwise(points)
+        if b.solution.parameter < math.pi and b.kind != "snap"
     ]
     assert min(rises) > 0.0
-    assert all(visit.at.slope > 0.0 for visit in visits if not visit.kind)
+    assert all(point.solution.slope > 0.0 for point in points if not point.kind)
 
 
 @pytest.mark.parametrize(("h_over_t", "name"), [(4.0, "quarter"), (4.0, "full"), (1.6, "quarter")])
 def test_a_dead_moment_comes_back_to_the_flat_ring(h_over_t, name):
     """Loading ends at gamma = pi, unloading at gamma = 0 exactly, where the ring is flat, M = 0."""
-    piece, visits = marched("moment", h_over_t, name, unload=True)
-    gamma = np.array(loads(visits))
+    ring, points = marched("moment", h_over_t, name, unload=True)
+    gamma = np.array(loads(points))
     top = int(np.argmax(gamma))
     assert gamma[top] == math.pi
     assert gamma[-1] == 0.0
     assert np.diff(gamma[top:]).max() <= 0.0
-    assert abs(piece.moment(visits[-1].at.moment)) < 1e-9
-    assert abs(visits[-1].at.energy) < 1e-12
+    assert abs(ring.arm_moment(points[-1].solution.moment)) < 1e-9
+    assert abs(points[-1].solution.energy) < 1e-12
 
 
 def test_the_folded_ring_pops_open_at_its_lower_limit():
@@ -266,62 +268,62 @@ def test_the_folded_ring_pops_open_at_its_lower_limit():
 
     The same limit as the arclength path's second, to 1e-9 rad; it lands at the stop at 0.
     """
-    piece, visits = marched("moment", 4.0, unload=True)
-    _, lower = of_kind(visits, "limit")
-    _, landing = of_kind(visits, "snap")
-    assert abs(lower.at.state.load - of_kind(path(4.0), "limit")[1].at.state.load) < 1e-9
-    assert piece.moment(lower.at.moment) < -0.01
-    assert landing.details["gamma_fold"] == lower.at.state.load
-    assert landing.at.state.load == 0.0
+    ring, points = marched("moment", 4.0, unload=True)
+    _, lower = of_kind(points, "limit")
+    _, landing = of_kind(points, "snap")
+    assert abs(lower.solution.parameter - of_kind(path(4.0), "limit")[1].solution.parameter) < 1e-9
+    assert ring.arm_moment(lower.solution.moment) < -0.01
+    assert landing.details["gamma_fold"] == lower.solution.parameter
+    assert landing.solution.parameter == 0.0
 
 
 def test_a_ring_that_is_not_stable_folded_snaps_as_soon_as_it_is_let_go():
     """At h/t = 2 dM/dgamma < 0 at pi: at M = 0 the ring falls from there to flat."""
-    piece, visits = marched("moment", 2.0, unload=True)
-    folded, opened = of_kind(visits, "snap")
-    assert folded.at.state.load == math.pi
-    assert folded.at.slope < 0.0
+    ring, points = marched("moment", 2.0, unload=True)
+    folded, opened = of_kind(points, "snap")
+    assert folded.solution.parameter == math.pi
+    assert folded.solution.slope < 0.0
     assert opened.details["gamma_fold"] == math.pi
-    assert opened.at is visits[-1].at
-    assert opened.details["energy_released"] == pytest.approx(piece.copies * folded.at.energy)
+    assert opened.solution is points[-1].solution
+    assert opened.details["energy_released"] == pytest.approx(ring.copies * folded.solution.energy)
 
 
 def test_a_ring_that_is_not_folded_at_pi_unloads_from_the_moment_it_has_there():
     """At h/t = 1 M(pi) > 0: down from it, one snap back at a limit of M > 0, and on to flat."""
-    piece, visits = marched("moment", 1.0, unload=True)
-    top = next(visit for visit in visits if visit.at.state.load == math.pi)
-    _, back = of_kind(visits, "snap")
-    assert piece.moment(top.at.moment) > back.details["moment_before"] > 0.0
+    ring, points = marched("moment", 1.0, unload=True)
+    top = next(point for point in points if point.solution.parameter == math.pi)
+    _, back = of_kind(points, "snap")
+    assert ring.arm_moment(top.solution.moment) > back.details["moment_before"] > 0.0
     assert abs(back.details["moment_after"] - back.details["moment_before"]) < 1e-9
-    assert back.at.state.load < back.details["gamma_fold"]
+    assert back.solution.parameter < back.details["gamma_fold"]
 
 
 def test_the_dead_moment_only_falls_on_the_way_back():
     """Between the snaps of unloading M falls from state to state, at stable equilibrium."""
-    _, visits = marched("moment", 1.0, unload=True)
-    top = int(np.argmax(loads(visits)))
-    back = visits[top:]
-    falls = [b.at.moment - a.at.moment for a, b in pairwise(back) if b.kind != "snap"]
+    _, points = marched("moment", 1.0, unload=True)
+    top = int(np.argmax(loads(points)))
+    back = points[top:]
+    falls = [b.solution.moment - a.solution.moment for a, b in pairwise(back) if b.kind != "snap"]
     assert max(falls) < 0.0
-    assert all(visit.at.slope > 0.0 for visit in back if not visit.kind)
+    assert all(point.solution.slope > 0.0 for point in back if not point.kind)
 
 
 def test_a_stop_at_zero_that_is_only_overrun_does_not_hold_the_ring():
     """A motion that would come to rest at gamma > 0 under M > 0 is no landing at 0."""
-    _, visits = marched("moment", 1.0, unload=True)
-    _, back = of_kind(visits, "snap")
-    assert back.at.state.load > 0.1
-    assert visits[-1].kind != "snap"
+    _, points = marched("moment", 1.0, unload=True)
+    _, back = of_kind(points, "snap")
+    assert back.solution.parameter > 0.1
+    assert points[-1].kind != "snap"
 
 
 def test_a_ring_that_comes_to_rest_at_its_stop_is_on_it():
     """A triangle that is let go at M = 0 rests at gamma = 0 to rounding: it ends there exactly."""
-    ring = der.triangle(math.radians(75.459472779033), 0.18701066520775167)
-    piece = sector(ring, der.rectangular_section(3.6130411355236483), 128)
-    wanted = Wanted(contacts=False, stability=False)
-    *_, last = follow_moment(piece, wanted, Tally(), unload=True)
+    shape = der.triangle(math.radians(75.459472779033), 0.18701066520775167)
+    ring = gripped_ring(shape, der.rectangular_section(3.6130411355236483), 128)
+    request = Request(self_crossings=False, stability=False)
+    *_, last = follow_moment(ring, request, Statistics(), unload=True)
     assert last.kind == "snap"
-    assert last.at.state.load == 0.0
+    assert last.solution.parameter == 0.0
 
 
 # --- relaxation alone ---------------------------------------------------------------------------
@@ -334,37 +336,37 @@ def test_relaxed_states_agree_with_newton(h_over_t, name):
 
     Measured 2e-8 at h/t = 4, 4e-7 next to the fold at 1.6, where the ring is softest.
     """
-    piece, visits = marched("relaxed", h_over_t, name)
+    ring, points = marched("relaxed", h_over_t, name)
     worst = max(
-        abs(piece.moment(solved(piece.body, piece.held, one.at.state).moment - one.at.moment))
-        for one in visits
+        abs(ring.arm_moment(solved(ring, one.solution.state).moment - one.solution.moment))
+        for one in points
     )
     assert worst < 1e-6
-    assert visits[-1].at.state.load == math.pi
+    assert points[-1].solution.parameter == math.pi
 
 
 def test_relaxation_brackets_the_fold():
     """Both snaps at h/t = 1.6 lie past the fold of the path, by no more than the resolution."""
-    _, visits = marched("relaxed", 1.6, unload=True)
-    up, down = of_kind(visits, "snap")
+    _, points = marched("relaxed", 1.6, unload=True)
+    up, down = of_kind(points, "snap")
     first, second = loads(of_kind(path(1.6), "fold"))
-    assert 0.0 <= up.at.state.load - first <= RESOLUTION
-    assert 0.0 <= second - down.at.state.load <= RESOLUTION
+    assert 0.0 <= up.solution.parameter - first <= RESOLUTION
+    assert 0.0 <= second - down.solution.parameter <= RESOLUTION
     assert isinstance(up, Landing)
 
 
 def test_relaxation_finds_the_limits_of_the_moment():
     """Limits by parabolas: M to 1e-7 and gamma to 1e-4 of those of the path, all of them."""
-    piece, visits = marched("relaxed", 4.0)
-    here, there = of_kind(visits, "limit"), of_kind(path(4.0), "limit")
+    ring, points = marched("relaxed", 4.0)
+    here, there = of_kind(points, "limit"), of_kind(path(4.0), "limit")
     assert len(here) == len(there) == 2
     for a, b in zip(here, there, strict=True):
-        assert abs(piece.moment(a.at.moment - b.at.moment)) < 1e-7
-        assert abs(a.at.state.load - b.at.state.load) < 1e-4
+        assert abs(ring.arm_moment(a.solution.moment - b.solution.moment)) < 1e-7
+        assert abs(a.solution.parameter - b.solution.parameter) < 1e-4
 
 
 @pytest.mark.parametrize(
-    ("ring", "n_edges", "h_over_t", "nu", "curvature"),
+    ("shape", "n_edges", "h_over_t", "nu", "curvature"),
     [
         (der.circle(), 16, 1.839582, 0.5, "logarithm"),
         (der.circle(), 32, 1.6, 0.3, "logarithm"),
@@ -372,53 +374,53 @@ def test_relaxation_finds_the_limits_of_the_moment():
     ],
     ids=["circle 16", "circle 32", "square 16"],
 )
-def test_relaxation_on_few_edges_finds_what_newton_does(ring, n_edges, h_over_t, nu, curvature):
+def test_relaxation_on_few_edges_finds_what_newton_does(shape, n_edges, h_over_t, nu, curvature):
     """Limits 1e-3 rad before a fold, and the snap past it, in steps of 0.05 rad.
 
     Once a parabola through the steps put the limit beyond the fold, on another branch.
     """
-    piece = sector(ring, der.rectangular_section(h_over_t, nu), n_edges, measure=curvature)
-    wanted = Wanted(stability=False, contacts=False)
+    ring = gripped_ring(shape, der.rectangular_section(h_over_t, nu), n_edges, measure=curvature)
+    request = Request(stability=False, self_crossings=False)
     here, there = (
-        [v for v in follower(piece, wanted, Tally()) if v.kind in ("limit", "snap")]
+        [v for v in follower(ring, request, Statistics()) if v.kind in ("limit", "snap")]
         for follower in (follow_relaxed, follow_angle)
     )
     assert [v.kind for v in here] == [v.kind for v in there]
     assert "snap" in [v.kind for v in here]
     for a, b in zip(here, there, strict=True):
-        assert a.at.state.load == pytest.approx(b.at.state.load, abs=5e-6)
-        assert a.at.moment == pytest.approx(b.at.moment, abs=1e-5)
+        assert a.solution.parameter == pytest.approx(b.solution.parameter, abs=5e-6)
+        assert a.solution.moment == pytest.approx(b.solution.moment, abs=1e-5)
 
 
 def test_a_jump_shorter_than_what_is_noticed_shows_in_its_energy():
     """A state that is near enough, whose energy is not that of the last and the work in between."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 32)
-    walk = _Walk(piece, Wanted(stability=False), Tally(), RISE, 1e-9, 0)
-    trail = [rested(piece, [], walk.relaxed(piece.start))]
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32)
+    walk = _Walk(ring, Request(stability=False), Statistics(), RISE, 1e-9, 0)
+    trail = [rested(ring, [], walk.relaxed(ring.start))]
     for load in (0.02, 0.04, 0.06):
-        found = walk.relaxed(ahead(piece, trail, load))
-        assert went_on(piece, trail, found)
+        found = walk.relaxed(ahead(ring, trail, load))
+        assert went_on(ring, trail, found)
         assert is_work(trail, found, abs(found.moment))
-        trail = longer(piece, trail, found)
+        trail = longer(ring, trail, found)
     fallen = replace(found, energy=found.energy - 3e-3 * found.moment * 0.02)
-    assert went_on(piece, trail[:-1], fallen)
+    assert went_on(ring, trail[:-1], fallen)
     assert not is_work(trail[:-1], fallen, abs(found.moment))
 
 
 def test_a_state_all_but_beside_the_last_one_does_not_lead_the_way():
     """Differences over 1e-7 rad would magnify the residual to what a step of 0.05 turns."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 32)
-    walk = _Walk(piece, Wanted(stability=False), Tally(), RISE, 1e-9, 0)
-    trail = [rested(piece, [], walk.relaxed(piece.start))]
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32)
+    walk = _Walk(ring, Request(stability=False), Statistics(), RISE, 1e-9, 0)
+    trail = [rested(ring, [], walk.relaxed(ring.start))]
     for load in (0.05, 0.1, 0.1 + 1e-7):
-        trail = longer(piece, trail, walk.relaxed(ahead(piece, trail, load)))
+        trail = longer(ring, trail, walk.relaxed(ahead(ring, trail, load)))
     assert [at.state.load for at in trail] == [0.0, 0.05, 0.1 + 1e-7]
-    assert abs(walk.relaxed(ahead(piece, trail, 0.15)).state.load - 0.15) < 1e-15
-    assert went_on(piece, trail, walk.relaxed(ahead(piece, trail, 0.15)))
+    assert abs(walk.relaxed(ahead(ring, trail, 0.15)).state.load - 0.15) < 1e-15
+    assert went_on(ring, trail, walk.relaxed(ahead(ring, trail, 0.15)))
 
 
 def test_slope_without_a_hessian_is_of_second_order():
     """DM/dgamma at pi, by differences: within 1e-2 of the path's, relative to that at 0."""
-    _, visits = marched("relaxed", 4.0)
-    exact = path(4.0)[-1].at.slope
-    assert abs(visits[-1].at.slope - exact) < 1e-2 * path(4.0)[0].at.slope
+    _, points = marched("relaxed", 4.0)
+    exact = path(4.0)[-1].solution.slope
+    assert abs(points[-1].solution.slope - exact) < 1e-2 * path(4.0)[0].solution.slope

@@ -1,20 +1,22 @@
-"""Passages of strands: the signed gap, and where it vanishes on a step of a path."""
+"""Self-crossings: the signed gap of two strands, and where it vanishes on a step of a path."""
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import der
-import der.continuation.events
-from der.analysis.self_crossing import gap, nearest_strands
-from der.continuation.arclength import Tally, Visit, Wanted, follow
-from der.continuation.step import Step
+import der.analysis.self_crossing
+from der.analysis.request import Request
+from der.continuation.step import Step, between
 from der.kernels.quaternions import rotation_vector
-from der.rod.equilibrium import Control, Direction, equilibrium, moved
-from der.rod.gripped_ring import Sector, sector
-from der.rod.stability import indices_and_stiffness, stack
+from der.kernels.strands import gap, nearest_strands
+from der.problem import PLANE, Point, Statistics
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
+from der.rod.rod import State
 
 
 def eight(height: float, n: int = 40) -> np.ndarray:
@@ -24,23 +26,20 @@ def eight(height: float, n: int = 40) -> np.ndarray:
 
 
 @functools.cache
-def contacts() -> tuple[Sector, tuple[Visit, ...]]:
-    """Quarter of the circle with h/t = 4, 32 edges, and the passages on its path."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 32)
-    found = follow(piece, Wanted(stability=False, targets=()), Tally())
-    return piece, tuple(one for one in found if one.kind == "contact")
+def crossings() -> tuple[GrippedRing, tuple[Point[Equilibrium], ...]]:
+    """Quarter of the circle with h/t = 4, 32 edges, and the self-crossings on its path."""
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32)
+    found = Request(stability=False, targets=()).follow(ring)
+    return ring, tuple(one for one in found if one.kind == "contact")
 
 
 @functools.cache
-def a_step() -> Step:
+def a_step() -> Step[State]:
     """A long step of that ring, between gamma = 1 and 1.5."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 32)
-    found = follow(piece, Wanted(stability=False, contacts=False, targets=(1.0, 1.5)), Tally())
-    a, b = (one.at for one in found if one.at.state.load in (1.0, 1.5))
-    trial = Step(piece, a, b, 1.0, 1e-10, Tally())
-    length = float(np.vdot(piece.body.mass * a.tangent.q, trial.jump.q))
-    length += a.tangent.load * trial.jump.load
-    return Step(piece, a, b, length, 1e-10, Tally())
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32)
+    found = Request(stability=False, self_crossings=False, targets=(1.0, 1.5)).follow(ring)
+    a, b = (one.solution for one in found if one.solution.parameter in (1.0, 1.5))
+    return between(ring, a, b, tolerance=1e-10, statistics=Statistics())
 
 
 @pytest.mark.parametrize("height", [0.1, 1e-3, -1e-3, -0.1])
@@ -65,56 +64,57 @@ def test_a_plane_convex_curve_has_no_strands_but_opposite_ones():
     assert k - i == 2
 
 
-def test_the_link_changes_at_a_contact():
+def test_the_link_changes_at_a_self_crossing():
     """It is `linking_before` at the state given, and `linking_after` 1e-5 further along s."""
-    piece, found = contacts()
+    ring, found = crossings()
     assert len(found) >= 2
     for one in found:
-        t, s = one.at.tangent, 1e-5
-        step = Direction(s * t.q, s * t.force, s * t.load)
-        start = moved(piece.held, one.at.state, step)
-        beyond = equilibrium(piece.body, piece.held, start, along=t, control=Control.DIRECTION)
-        assert piece.link(one.at.state) == one.details["linking_before"]
-        assert piece.link(beyond.state) == one.details["linking_after"]
+        here = one.solution
+        start = ring.retract(here.state, 1e-5 * here.tangent)
+        beyond = ring.correct(start, along=here.tangent, hold=PLANE)
+        assert ring.link(here.state) == one.details["linking_before"]
+        assert ring.link(beyond.state) == one.details["linking_after"]
 
 
-def test_bisection_finds_the_same_contacts(monkeypatch):
-    """Where passages are not seen the link is bisected, to 1e-5 of s."""
-    _, found = contacts()
-    monkeypatch.setattr(der.continuation.events, "passage", lambda *_: None)
-    bisected = contacts.__wrapped__()[1]
+def test_bisection_finds_the_same_self_crossings(monkeypatch):
+    """Where crossings are not seen the link is bisected, to 1e-5 of s."""
+    _, found = crossings()
+    monkeypatch.setattr(der.analysis.self_crossing, "crossing", lambda *_: None)
+    bisected = crossings.__wrapped__()[1]
     assert [one.details for one in bisected] == [one.details for one in found]
-    gammas = [one.at.state.load for one in found]
-    assert [one.at.state.load for one in bisected] == pytest.approx(gammas, abs=1e-5)
+    gammas = [one.solution.parameter for one in found]
+    assert [one.solution.parameter for one in bisected] == pytest.approx(gammas, abs=1e-5)
 
 
-def test_no_contact_is_made_up_where_a_ring_ends_in_its_plane():
+def test_no_self_crossing_is_made_up_where_a_ring_ends_in_its_plane():
     """A stadium that turns back ends inside out, covering itself five times: Lk is not defined.
 
-    What rounding made of Tw + Wr there could show as a contact 1e-6 rad before the end.
+    What rounding made of Tw + Wr there could show as a self-crossing 1e-6 rad before the end.
     """
     section = der.rectangular_section(3.006756668718511, nu=0.0)
-    ring = der.rectangle(0.4824982358095524, 0.3494169915718395, twist_axis="y")
-    piece = sector(ring, section, 64)
-    *_, before, last = follow(piece, Wanted(stability=False, targets=(-3.1,)), Tally())
-    assert last.at.state.load == -math.pi
-    assert der.continuation.events.covering(piece, last.at) == -5
-    assert der.continuation.events.touches_itself(piece, last.at)
-    assert (before.kind, last.link) == ("", None)
-    assert der.continuation.events.covering(piece, before.at) is None
-    assert not der.continuation.events.touches_itself(piece, before.at)
+    stadium = der.rectangle(0.4824982358095524, 0.3494169915718395, twist_axis="y")
+    ring = gripped_ring(stadium, section, 64)
+    *_, before, last = Request(stability=False, targets=(-3.1,)).follow(ring)
+    assert last.solution.parameter == -math.pi
+    assert ring.turning_number(last.solution.state) == -5
+    assert ring.overlaps(last.solution.state)
+    assert before.kind == ""
+    assert ring.turning_number(before.solution.state) is None
+    assert not ring.overlaps(before.solution.state)
 
 
-def test_a_wrong_passage_does_no_harm(monkeypatch):
-    """What is no passage splits the step like any other place."""
-    _, found = contacts()
+def test_a_wrong_place_does_no_harm(monkeypatch):
+    """What is no crossing splits the step like any other place."""
+    _, found = crossings()
     monkeypatch.setattr(
-        der.continuation.events, "passage", lambda step, low, high: low + 0.3 * (high - low)
+        der.analysis.self_crossing,
+        "crossing",
+        lambda ring, step, low, high: low + 0.3 * (high - low),
     )
-    misled = contacts.__wrapped__()[1]
+    misled = crossings.__wrapped__()[1]
     assert [one.details for one in misled] == [one.details for one in found]
-    gammas = [one.at.state.load for one in found]
-    assert [one.at.state.load for one in misled] == pytest.approx(gammas, abs=1e-5)
+    gammas = [one.solution.parameter for one in found]
+    assert [one.solution.parameter for one in misled] == pytest.approx(gammas, abs=1e-5)
 
 
 # --- steps and roots --------------------------------------------------------------------------
@@ -127,7 +127,7 @@ def test_states_found_in_a_step_improve_its_curve():
     exact = step.polished(s, step.expected(s)).state
 
     def error(*known: float) -> float:
-        fresh = Step(step.piece, step.start, step.end, step.length, 1e-10, Tally())
+        fresh = replace(step, statistics=Statistics())
         for u in known:
             fresh.at(u * step.length)
         return float(np.linalg.norm(rotation_vector(fresh.expected(s).quat, exact.quat)))
@@ -139,20 +139,16 @@ def test_states_found_in_a_step_improve_its_curve():
 def test_a_state_is_solved_for_once():
     """The same s gives the same state, and costs nothing the second time."""
     step = a_step()
-    fresh = Step(step.piece, step.start, step.end, step.length, 1e-10, Tally())
-    first, spent = fresh.at(0.1), fresh.tally.newton_iterations
+    fresh = replace(step, statistics=Statistics())
+    first, spent = fresh.at(0.1), fresh.statistics.newton_iterations
     assert fresh.at(0.1) is first
-    assert fresh.tally.newton_iterations == spent > 0
+    assert fresh.statistics.newton_iterations == spent > 0
 
 
 @pytest.mark.parametrize("name", ["quarter", "half", "full"])
 def test_classes_together_give_what_they_give_alone(name):
     """One kernel assembles a state once for all classes: to the last bit the same."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 32, name=name)
-    at = (piece.body, piece.held)
-    together = indices_and_stiffness(*at, piece.modes, piece.start)
-    alone = [
-        indices_and_stiffness(*at, stack([modes]), piece.start)
-        for _, modes in piece.classes.values()
-    ]
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32, name=name)
+    together = ring.indices(ring.start)
+    alone = [ring.indices(ring.start, label) for label in ring.classes]
     assert together == tuple(tuple(one[k][0] for one in alone) for k in (0, 1))

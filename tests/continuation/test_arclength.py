@@ -2,51 +2,57 @@
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rods import solved
 
 import der
-from der.continuation.arclength import Stuck, Tally, Visit, Wanted, follow
+from der.analysis.request import Request
 from der.continuation.step import Step
+from der.errors import ContinuationFailed, Reason
 from der.kernels.quaternions import rotation_vector
-from der.rod.equilibrium import Control, Direction, Equilibrium, moved
-from der.rod.gripped_ring import Sector, sector
+from der.problem import PLANE, Options, Point, Statistics
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
+
+FINE = Options(aimed_turn=0.05)
 
 
-def circle(h_over_t: float) -> Sector:
+def circle(h_over_t: float) -> GrippedRing:
     """Return the quarter of a circle of 64 edges."""
-    return sector(der.circle(), der.rectangular_section(h_over_t), 64)
+    return gripped_ring(der.circle(), der.rectangular_section(h_over_t), 64)
+
+
+def asked_of(h_over_t: float) -> Request:
+    """Return what the path is asked for; h/t = 1 is followed beyond pi until it is folded."""
+    return Request(6.0 if h_over_t == 1.0 else math.pi, until_folded=h_over_t == 1.0)
 
 
 @functools.cache
-def visits(h_over_t: float) -> tuple[Sector, tuple[Visit, ...]]:
-    """Quarter and states of its path; h/t = 1 is followed beyond pi until it is folded."""
-    piece = circle(h_over_t)
-    wanted = Wanted(load_max=6.0 if h_over_t == 1.0 else math.pi, until_folded=h_over_t == 1.0)
-    return piece, tuple(follow(piece, wanted, Tally()))
+def points(h_over_t: float) -> tuple[GrippedRing, tuple[Point, ...]]:
+    """Quarter and states of its path."""
+    ring = circle(h_over_t)
+    return ring, tuple(asked_of(h_over_t).follow(ring))
 
 
-def of_kind(h_over_t: float, kind: str) -> tuple[Sector, list[Visit]]:
+def of_kind(h_over_t: float, kind: str) -> tuple[GrippedRing, list[Point]]:
     """Quarter and special points of one kind."""
-    piece, found = visits(h_over_t)
-    return piece, [visit for visit in found if visit.kind == kind]
+    ring, found = points(h_over_t)
+    return ring, [point for point in found if point.kind == kind]
 
 
-def along(piece: Sector, at: Equilibrium, s: float) -> Equilibrium:
+def along(ring: GrippedRing, at: Equilibrium, s: float) -> Equilibrium:
     """Return the equilibrium at a distance s from another, measured along its tangent."""
-    t = at.tangent
-    start = moved(piece.held, at.state, Direction(s * t.q, s * t.force, s * t.load))
-    return solved(piece.body, piece.held, start, along=t, control=Control.DIRECTION)
+    start = ring.retract(at.state, s * at.tangent)
+    return solved(ring, start, along=at.tangent, hold=PLANE)
 
 
-def at_load(piece: Sector, at: Equilibrium, load: float) -> Equilibrium:
+def at_load(ring: GrippedRing, at: Equilibrium, load: float) -> Equilibrium:
     """Return the equilibrium at a load near that of another."""
-    rise = (load - at.state.load) / at.tangent.load
-    t = at.tangent
-    start = moved(piece.held, at.state, Direction(rise * t.q, rise * t.force, load - at.state.load))
-    return solved(piece.body, piece.held, start)
+    rise = (load - at.parameter) / at.parameter_rate
+    return solved(ring, ring.retract(at.state, rise * at.tangent), value=load)
 
 
 def folded(h_over_t: float, **wants: object) -> der.Path:
@@ -59,18 +65,16 @@ def test_cubic_prediction_is_of_fourth_order():
 
     The cubic through two states and tangents, 4 h^4/24 times the fourth derivative off.
     """
-    piece, found = visits(4.0)
-    middle = next(visit.at for visit in found if visit.at.state.load > 0.5)
+    ring, found = points(4.0)
+    middle = next(one.solution for one in found if one.solution.parameter > 0.5)
     errors = []
     for h in (0.04, 0.02):
-        behind, ahead = along(piece, middle, -h), along(piece, middle, h)
-        guess = Step(piece, behind, middle, h, 1e-10, Tally()).beyond(h)
-        start = moved(piece.held, middle.state, guess)
-        exact = solved(
-            piece.body, piece.held, start, along=middle.tangent, control=Control.DIRECTION
-        )
+        behind, ahead = along(ring, middle, -h), along(ring, middle, h)
+        guess = Step(ring, behind, middle, h, 1e-10, Statistics()).beyond(h)
+        start = ring.retract(middle.state, guess)
+        exact = solved(ring, start, along=middle.tangent, hold=PLANE)
         errors.append(np.linalg.norm(rotation_vector(start.quat, exact.state.quat)))
-        assert exact.state.load == pytest.approx(ahead.state.load, abs=1e-6)
+        assert exact.parameter == pytest.approx(ahead.parameter, abs=1e-6)
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.1)
 
 
@@ -85,7 +89,7 @@ def test_gamma_is_stationary_at_a_fold(h_over_t):
     """
     _, folds = of_kind(h_over_t, "fold")
     assert len(folds) == 2
-    assert max(abs(fold.at.tangent.load) for fold in folds) < 3e-11
+    assert max(abs(fold.solution.parameter_rate) for fold in folds) < 3e-11
 
 
 @pytest.mark.parametrize("h_over_t", [1.6, 1.0])
@@ -95,13 +99,15 @@ def test_fold_is_located_to_1e_10(h_over_t):
     An independent location: it uses no rate. Its own error is of order 1e-16, and measured; a fold
     that is off by 1e-5 along the path is off by 1e-10 in gamma.
     """
-    piece, folds = of_kind(h_over_t, "fold")
+    ring, folds = of_kind(h_over_t, "fold")
     for fold in folds:
         s = np.array([-1e-4, 0.0, 1e-4])
-        gamma = np.array([along(piece, fold.at, x).state.load for x in s])
+        gamma = np.array([along(ring, fold.solution, x).parameter for x in s])
         curvature = (gamma[0] - 2 * gamma[1] + gamma[2]) / s[2] ** 2
         slope = (gamma[2] - gamma[0]) / (2 * s[2])
-        assert gamma[1] - slope**2 / (2 * curvature) == pytest.approx(fold.at.state.load, abs=1e-10)
+        assert gamma[1] - slope**2 / (2 * curvature) == pytest.approx(
+            fold.solution.parameter, abs=1e-10
+        )
         assert abs(curvature) > 0.1
 
 
@@ -113,15 +119,15 @@ def test_moment_is_stationary_at_a_limit(h_over_t):
     derivative of 5e4. Measured 6e-10, rounding; d2M/dgamma2 is 0.14 to 180, so that 2e-9 means
     gamma within 2e-8 at the flattest limit.
     """
-    piece, limits = of_kind(h_over_t, "limit")
+    ring, limits = of_kind(h_over_t, "limit")
     assert limits
     for limit in limits:
-        gamma = limit.at.state.load
+        at = limit.solution
         d = 2e-5
-        m = [at_load(piece, limit.at, gamma + k * d).moment for k in (-2, -1, 1, 2)]
-        slope = piece.moment(8 * (m[2] - m[1]) - (m[3] - m[0])) / (12 * d)
+        m = [at_load(ring, at, at.parameter + k * d).moment for k in (-2, -1, 1, 2)]
+        slope = ring.arm_moment(8 * (m[2] - m[1]) - (m[3] - m[0])) / (12 * d)
         assert abs(slope) < 2e-9
-        assert (m[1] - limit.at.moment) * (m[2] - limit.at.moment) > 0.0
+        assert (m[1] - at.moment) * (m[2] - at.moment) > 0.0
 
 
 def test_index_differs_across_folds_and_branches():
@@ -176,18 +182,23 @@ def test_path_ends_at_its_first_arrival_at_gamma_max(gamma_max):
     assert path.gamma[:-1].max() < gamma_max
 
 
-def test_states_asked_for_lie_on_the_path(monkeypatch):
+def test_states_asked_for_lie_on_the_path():
     """M at a given gamma, down to 1e-6 from a fold, does not depend on the steps that led there.
 
     Folds of h/t = 1.6 at 2.7671699 and 2.6109781. gamma is exact, but M errs by a residual of 1e-10
     over dgamma/ds, 4e-3 at the closest: measured 4e-10. Crossings differ by 5e-4 and more in M.
     """
     asked = (2.610979, 2.62, 2.7, 2.767169)
-    usual = folded(1.6, save_at=asked)
-    monkeypatch.setattr("der.continuation.arclength._ANGLE", 0.05)
-    short = folded(1.6, save_at=asked)
+    ring = circle(1.6)
+    usual, short = (
+        [one.solution for one in Request(targets=asked, options=options).follow(ring)]
+        for options in (Options(), FINE)
+    )
     for gamma in asked:
-        a, b = usual.moment[usual.gamma == gamma], short.moment[short.gamma == gamma]
+        a, b = (
+            [ring.arm_moment(at.moment) for at in found if at.parameter == gamma]
+            for found in (usual, short)
+        )
         assert len(a) == 3
         assert np.abs(np.diff(a)).min() > 2e-4
         assert a == pytest.approx(b, abs=1.5e-9)
@@ -196,55 +207,64 @@ def test_states_asked_for_lie_on_the_path(monkeypatch):
 # --- steps --------------------------------------------------------------------------------------
 
 
-def points(path: der.Path) -> list[der.Point]:
+def special(found: list[Point]) -> list[Point]:
     """Special points, but for contacts near the folded state.
 
     There the loops are closer to each other than the sides of the polygon to its circle, and
     polygons pass through each other: an artefact, not looked for in the last step.
     """
-    return [p for p in path.points if p.kind != "contact" or abs(p.gamma - math.pi) > 0.25]
+    return [
+        one
+        for one in found
+        if one.kind and (one.kind != "contact" or abs(one.solution.parameter - math.pi) > 0.25)
+    ]
 
 
 @pytest.mark.parametrize("h_over_t", [4.0, 1.6, 1.0])
-def test_points_do_not_depend_on_the_steps(h_over_t, monkeypatch):
+def test_points_do_not_depend_on_the_steps(h_over_t):
     """Steps of 0.05 instead of 0.12 rad give the same points: kinds, gamma, indices.
 
     Limits agree to 4e-11, folds and branch points to 4e-12; 1e-9 is asked for. Contacts to 1e-4,
     since they are sought to 1e-5 of s.
     """
-    wants = {"until": "folded"} if h_over_t == 1.0 else {}
-    usual = folded(h_over_t, **wants)
-    monkeypatch.setattr("der.continuation.arclength._ANGLE", 0.05)
-    short = folded(h_over_t, **wants)
-    assert short.timing.steps > 1.3 * usual.timing.steps
-    assert [point.kind for point in points(short)] == [point.kind for point in points(usual)]
-    for a, b in zip(points(usual), points(short), strict=True):
-        assert (a.index_before, a.index_after) == (b.index_before, b.index_after)
-        assert a.gamma == pytest.approx(b.gamma, abs=1e-4 if a.kind == "contact" else 1e-9)
+    ring, found, steps = circle(h_over_t), [], []
+    for options in (Options(), FINE):
+        count = Statistics()
+        request = replace(asked_of(h_over_t), options=options)
+        found.append(special(list(request.follow(ring, count))))
+        steps.append(count.steps)
+    usual, short = found
+    assert steps[1] > 1.3 * steps[0]
+    assert [one.kind for one in short] == [one.kind for one in usual]
+    for a, b in zip(usual, short, strict=True):
+        assert a.sides == b.sides
+        within = 1e-4 if a.kind == "contact" else 1e-9
+        assert a.solution.parameter == pytest.approx(b.solution.parameter, abs=within)
 
 
 @pytest.mark.parametrize("h_over_t", [4.0, 1.6, 1.0])
 def test_path_keeps_its_orientation(h_over_t):
     """The extended system's determinant keeps its sign along a path without simple branch points.
 
-    Truth: Keller 1977; its sign is that of dgamma/ds times (-1)^(negative pivots). A jump to
+    Truth: Keller 1977; its sign is that of dgamma/ds times (-1)^index. A jump to
     another branch, or a turn back, changes it. Odd pairs are not seen on the quarter.
     """
-    _, found = visits(h_over_t)
-    regular = [visit.at for visit in found if visit.kind in ("", "contact")]
-    signs = {(-1) ** at.negative * math.copysign(1.0, at.tangent.load) for at in regular}
+    _, found = points(h_over_t)
+    regular = [one.solution for one in found if one.kind in ("", "contact")]
+    signs = {(-1) ** at.index * math.copysign(1.0, at.parameter_rate) for at in regular}
     assert len(signs) == 1
 
 
 def test_path_that_does_not_end_says_so():
     """A path of too few steps hands out its states and then ends in its named result."""
-    tally = Tally()
-    path = follow(circle(4.0), Wanted(most_steps=3), tally)
+    count = Statistics()
+    path = Request(options=Options(max_steps=3)).follow(circle(4.0), count)
     found = [next(path) for _ in range(4)]
-    assert found[-1].at.state.load > found[0].at.state.load == 0.0
-    with pytest.raises(Stuck, match="not ended after 3 steps"):
+    assert found[-1].solution.parameter > found[0].solution.parameter == 0.0
+    with pytest.raises(ContinuationFailed, match="not ended after 3 steps") as caught:
         list(path)
-    assert tally.steps == 3
+    assert caught.value.reason is Reason.TOO_MANY_STEPS
+    assert count.steps == 3
 
 
 def test_path_that_bends_too_far_keeps_what_was_found():
@@ -269,12 +289,16 @@ def test_path_does_not_leap_over_a_sharp_turn():
     At h/t = 0.86 the path turns so sharply beyond pi that a step of 0.6 can leap over the turn. The
     folds found are those of steps five times finer, to rounding.
     """
-    piece = circle(0.86)
-    wanted = Wanted(load_max=math.inf, until_folded=True, stability=False, contacts=False)
-    coarse = [v.at.state.load for v in follow(piece, wanted, Tally()) if v.kind == "fold"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(der.continuation.arclength, "LARGEST_STEP", 0.12)
-        fine = [v.at.state.load for v in follow(piece, wanted, Tally()) if v.kind == "fold"]
+    ring = circle(0.86)
+    request = Request(math.inf, until_folded=True, stability=False, self_crossings=False)
+    coarse, fine = (
+        [
+            one.solution.parameter
+            for one in replace(request, options=options).follow(ring)
+            if one.kind == "fold"
+        ]
+        for options in (Options(), Options(largest_step=0.12))
+    )
     assert coarse == pytest.approx(fine, abs=1e-9)
     assert len(coarse) > 0
 

@@ -8,22 +8,15 @@ import pytest
 from rods import lifted
 
 import der
-from der.continuation.arclength import follow
-from der.continuation.bifurcations import SAME, is_fold
-from der.continuation.events import (
-    Visit,
-    Wanted,
-    _closest,
-    _Mark,
-    _on_its_side,
-    special_points,
-    visit,
-)
-from der.continuation.extrema import _cut
-from der.continuation.step import Step, Tally
-from der.rod.equilibrium import dot
-from der.rod.gripped_ring import sector
-from der.rod.stability import index, indices_and_stiffness, raw_index, softest_modes, stack
+from der.analysis.request import Request
+from der.analysis.self_crossing import _on_its_side
+from der.continuation.bifurcations import _closest, is_fold
+from der.continuation.events import Mark, located
+from der.continuation.extrema import _bisected
+from der.continuation.step import SAME, between
+from der.problem import Options, Point, Statistics
+from der.rod.gripped_ring import gripped_ring
+from der.rod.stability import index
 
 # h/t = 2.5075: beyond the first fold one out-of-phase mode is unstable for 6e-5 rad of gamma
 NEARLY = der.triangle(math.radians(60), 0.0866)
@@ -40,13 +33,16 @@ def branches(ring, h_over_t, **numerics):
 
 def step_over_both():
     """The step from before the first fold to a state beyond the second change of the index."""
-    piece = sector(NEARLY, SECTION, 64)
-    wanted = Wanted(contacts=False, stability=False, targets=())
-    found = list(follow(piece, wanted, Tally()))
+    ring = gripped_ring(NEARLY, SECTION, 64)
+    found = list(Request(targets=(), stability=False, self_crossings=False).follow(ring))
     fold = next(k for k, one in enumerate(found) if one.kind == "fold")
     a, b = (next(v for v in side if not v.kind) for side in (found[fold::-1], found[fold:]))
-    trial = Step(piece, a.at, b.at, 1.0, 1e-10, Tally())
-    return Step(piece, a.at, b.at, dot(piece.body, a.at.tangent, trial.jump), 1e-10, Tally())
+    return step_between(ring, a, b)
+
+
+def step_between(ring, a, b):
+    """The step between two neighbouring points of a path."""
+    return between(ring, a.solution, b.solution, tolerance=1e-10, statistics=Statistics())
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -54,34 +50,40 @@ def test_a_contact_stands_on_the_side_of_a_state_that_its_load_says(side):
     """Where the place of that state is a little off, and only there."""
     step = step_over_both()
     s = 0.1 * step.length
-    asked = _Mark(s, Visit(step.at(s)))
-    line = [_Mark(0.0, Visit(step.start)), asked, _Mark(step.length, Visit(step.end))]
+    asked = Mark(s, Point(step.at(s)))
+    line = [Mark(0.0, Point(step.start)), asked, Mark(step.length, Point(step.end))]
     near, far = 0.5 * SAME * step.length, 1e-2 * step.length
     for off, said, expected in ((near, -side, side), (near, side, side), (far, -side, -side)):
-        contact = _Mark(s + said * off, Visit(step.at(s + side * near), "contact"))
+        contact = Mark(s + said * off, Point(step.at(s + side * near), "contact"))
         placed = _on_its_side(step, line, contact)
         assert (placed.s - s) * expected > 0.0
         assert abs(placed.s - contact.s) <= 1.01 * near
-        assert placed.visit is contact.visit
+        assert placed.point is contact.point
 
 
 # --- two changes within one step --------------------------------------------------------------
 
 
 @pytest.mark.parametrize("h_over_t", [3.446, 3.5, 3.505])
-def test_two_limits_within_one_step_are_found_at_any_length_of_steps(monkeypatch, h_over_t):
+def test_two_limits_within_one_step_are_found_at_any_length_of_steps(h_over_t):
     """Between two limits 0.05 and 0.009 rad apart M is all but level; at h/t = 3.505 they are gone.
 
     Truth: steps a seventh as long.
     """
     section = der.rectangular_section(h_over_t, nu=0.5)
-    wants = {"curvature": "angle", "self_crossings": False, "save_at": (1.64, 1.69)}
-    scene = der.Scene(der.circle(), section, n_edges=32, **wants)
-    found = der.fold(scene).points
-    monkeypatch.setattr("der.continuation.arclength.LARGEST_STEP", 0.05)
-    other = der.fold(scene).points
+    ring = gripped_ring(der.circle(), section, 32, measure="angle")
+    found, other = (
+        [
+            one.solution.parameter
+            for one in Request(targets=(1.64, 1.69), self_crossings=False, options=options).follow(
+                ring
+            )
+            if one.kind
+        ]
+        for options in (Options(), Options(largest_step=0.05))
+    )
     assert len(found) == len(other)
-    assert [p.gamma for p in found] == pytest.approx([p.gamma for p in other], abs=1e-8)
+    assert found == pytest.approx(other, abs=1e-8)
 
 
 def test_two_changes_of_an_index_within_one_step_are_found():
@@ -90,20 +92,20 @@ def test_two_changes_of_an_index_within_one_step_are_found():
     Truth: the index counted at 400 places of the step; what is found lies between neighbours.
     """
     step = step_over_both()
-    piece = step.piece
-    modes = piece.classes["out of phase"][1]
+    ring = step.system
     s = np.linspace(0.0, step.length, 400)
-    counted = np.array([raw_index(piece.body, piece.held, modes, step.at(x).state) for x in s])
+    counted = np.array([ring.count(step.at(x).state, "out of phase") for x in s])
     changes = np.flatnonzero(np.diff(counted))
     assert counted[0] == counted[-1] == 0
     assert len(changes) == 2
-    wanted = Wanted(contacts=False, targets=())
-    found, _ = special_points(piece, wanted, step, visit(piece, wanted, step.start))
+    request = Request(targets=(), self_crossings=False)
+    here = request.point(ring, step.start)
+    found, _ = located(ring, request.events(ring), step, here)
     pair = [one for one in found if one.kind == "branch"]
     assert [one.details["symmetry"] for one in pair] == ["out of phase"] * 2
     for one, k in zip(pair, changes, strict=True):
-        beyond, before = step.at(s[k + 1]).state.load, step.at(s[k]).state.load
-        assert beyond < one.at.state.load < before  # gamma runs back here
+        beyond, before = step.at(s[k + 1]).parameter, step.at(s[k]).parameter
+        assert beyond < one.solution.parameter < before  # gamma runs back here
 
 
 def test_both_changes_are_on_the_path():
@@ -179,31 +181,31 @@ def test_stiffness_is_estimated_well_where_it_is_small():
 
     Truth: `softest_modes`, converged. The estimate is what one inverse iteration gives.
     """
-    piece = sector(SIXTY, der.rectangular_section(4.0), 64)
+    ring = gripped_ring(SIXTY, der.rectangular_section(4.0), 64)
     torsion = (2.0 * math.pi / SIXTY.length) ** 2
     soft = 0
-    for one in follow(piece, Wanted(contacts=False, stability=False), Tally()):
-        for _, modes in piece.classes.values():
-            at = (piece.body, piece.held, modes, one.at.state)
-            (exact,), _ = softest_modes(*at)
-            (count,), (estimate,) = indices_and_stiffness(*at[:2], stack([modes]), at[3])
+    for one in Request(stability=False, self_crossings=False).follow(ring):
+        state = one.solution.state
+        for symmetry in ring.classes:
+            (exact,), _ = ring.softest_modes(state, symmetry=symmetry)
+            (count,), (estimate,) = ring.indices(state, symmetry)
             if one.kind != "fold" and abs(exact) < 0.02 * torsion:
                 assert estimate == pytest.approx(exact, rel=0.1)
-                assert count == index(*at)
+                assert count == index(ring.rod, ring.supports, ring.modes[symmetry], state)
                 soft += 1
     assert soft > 5
 
 
 def test_states_of_the_half_are_those_of_the_full_ring():
     """The class indices of a half at a state add up to the index of the full ring there."""
-    half, full = (sector(SIXTY, der.rectangular_section(4.0), 64, name=s) for s in ("half", "full"))
+    half, full = (
+        gripped_ring(SIXTY, der.rectangular_section(4.0), 64, name=s) for s in ("half", "full")
+    )
     seen = set()
-    for one in follow(half, Wanted(contacts=False), Tally()):
+    for one in Request(self_crossings=False).follow(half):
         if one.kind in ("fold", "branch"):
             continue
-        whole = lifted(half, one.at.state, full)
-        modes = full.classes["all"][1]
-        counted = raw_index(full.body, full.held, modes, whole.state)
+        counted = full.count(lifted(half, one.solution.state, full).state, "all")
         assert counted == sum(one.index)
         seen.add(counted)
     assert seen == {0, 1, 2}
@@ -271,16 +273,16 @@ def test_a_pair_of_modes_is_one_point_on_the_full_ring(n_edges):
 )
 def test_a_fold_is_told_from_a_branch_point(ring, h_over_t, name, kinds):
     """By the root of dgamma/dM, which is of no scale, also where the place is 1e-9 of s off."""
-    piece = sector(ring, der.rectangular_section(h_over_t), 64, name=name)
-    found = list(follow(piece, Wanted(contacts=False, load_max=math.pi, targets=()), Tally()))
+    gripped = gripped_ring(ring, der.rectangular_section(h_over_t), 64, name=name)
+    found = list(Request(targets=(), self_crossings=False).follow(gripped))
     seen = set()
     for k, one in enumerate(found):
         if one.kind not in ("fold", "branch"):
             continue
         a, b = (next(v for v in side if not v.kind) for side in (found[k::-1], found[k:]))
-        trial = Step(piece, a.at, b.at, 1.0, 1e-10, Tally())
-        step = Step(piece, a.at, b.at, dot(piece.body, a.at.tangent, trial.jump), 1e-10, Tally())
-        s = dot(piece.body, a.at.tangent, step.between(a.at.state, one.at.state))
+        step = step_between(gripped, a, b)
+        away = gripped.difference(a.solution.state, one.solution.state)
+        s = gripped.inner(a.solution.tangent, away)
         for off in (-1e-9, 0.0, 1e-9):
             assert is_fold(step, s + off) == (one.kind == "fold")
         seen.add(one.kind)
@@ -305,5 +307,5 @@ def test_a_leap_against_the_rates_at_both_ends_is_found(height, turns):
     """If a value changes against its rates, it has turned twice in between (mean value theorem)."""
     step = Leap(height)
     ends = [(s, step.at(s)) for s in (0.0, 1.0)]
-    rates = [rate for _, (_, rate) in _cut(step, ends, lambda at: at)]
+    rates = [rate for _, (_, rate) in _bisected(step, ends, lambda at: at)]
     assert sum(a * b < 0.0 for a, b in pairwise(rates)) == turns

@@ -10,8 +10,8 @@ from rods import turned_all
 
 from der.kernels.assembly import System, assemble, take_out
 from der.kernels.quaternions import rotation
-from der.rod.rod import Rod, State, edges, rod, strains
-from der.rod.supports import Supports, supports
+from der.rod.rod import Rod, State, discrete_rod, edges, strains
+from der.rod.supports import Supports, supported
 
 MEASURES = ("logarithm", "angle", "tangent")
 NEGLIGIBLE = 1e-30  # a stiffness that leaves the other terms alone
@@ -44,14 +44,14 @@ OPEN_AND_CLOSED = pytest.mark.parametrize("closed", [False, True], ids=["open", 
 class Problem(NamedTuple):
     """A rod, its supports and a state, bent, twisted and, with blocks of 4, stretched."""
 
-    body: Rod
-    held: Supports
+    rod: Rod
+    supports: Supports
     state: State
 
     def at(self, state: State) -> System:
         """Lagrangian's derivatives at a state."""
         return assemble(
-            self.body, self.held, state.quat, state.stretch, state.force, float(state.load)
+            self.rod, self.supports, state.quat, state.stretch, state.force, float(state.load)
         )
 
 
@@ -63,7 +63,7 @@ def problem(
     frames = classical.bent_and_twisted(rng, N, closed=closed)
     n_s = len(frames.ref_twist)
     (EI1, EI2, GJ, EA), n_c, load = TERMS[term]
-    body = rod(
+    rod = discrete_rod(
         rng.uniform(0.5, 1.5, size=n_s),
         rng.uniform(-0.4, 0.4, size=(n_s, 3)),
         (EI1, EI2, GJ),
@@ -74,8 +74,8 @@ def problem(
     conditions = tuple(
         (rng.uniform(-1.0, 1.0, size=N), rng.normal(size=3), rng.normal()) for _ in range(n_c)
     )
-    held = supports(
-        body,
+    supports = supported(
+        rod,
         clamped=(0, 1, N - 1) if grips else (),
         turn={0: 1.0, 1: -0.6, N - 1: -1.0} if grips else None,
         turn_axis=tuple(classical.unit(rng.normal(size=3))),
@@ -84,19 +84,19 @@ def problem(
     )
     stretch = rng.uniform(-0.2, 0.2, size=N) if block == 4 else np.zeros(N)
     return Problem(
-        body, held, State(classical.quaternions(frames), stretch, rng.normal(size=n_c), load)
+        rod, supports, State(classical.quaternions(frames), stretch, rng.normal(size=n_c), load)
     )
 
 
 def lagrangian(it: Problem, state: State) -> float:
     """L from strains and edge vectors, as the docstring of assembly.py has it."""
-    e = edges(it.body, state)
-    gap = np.einsum("kj,ji,ki->k", it.held.weight, e, it.held.axis) - it.held.target
+    e = edges(it.rod, state)
+    gap = np.einsum("kj,ji,ki->k", it.supports.weight, e, it.supports.axis) - it.supports.target
     return (
-        strains(it.body, state)[1].sum()
-        + 0.5 * it.body.stretching * it.body.length @ state.stretch**2
+        strains(it.rod, state)[1].sum()
+        + 0.5 * it.rod.stretching * it.rod.length @ state.stretch**2
         + state.force @ gap
-        - state.load * np.sum(it.held.pull * e)
+        - state.load * np.sum(it.supports.pull * e)
     )
 
 
@@ -108,7 +108,7 @@ def displaced(state: State, q: np.ndarray) -> State:
 
 def loaded(it: Problem, dload: float) -> State:
     """State under more load: grips turned about the fixed axis, by SciPy."""
-    w = it.held.turn[:, None] * dload * it.held.turn_axis
+    w = it.supports.turn[:, None] * dload * it.supports.turn_axis
     return it.state.but(quat=classical.spun(it.state.quat, w), load=it.state.load + dload)
 
 
@@ -183,8 +183,8 @@ def test_energy_is_the_elastic_part(term, measure, block, closed):
 def test_gap_is_what_the_position_conditions_miss(block):
     """Sum_j weight_kj e_j . axis_k - target_k; a few roundings of a sum of five."""
     it = problem("all", "angle", block, closed=False)
-    e = edges(it.body, it.state)
-    gap = np.einsum("kj,ji,ki->k", it.held.weight, e, it.held.axis) - it.held.target
+    e = edges(it.rod, it.state)
+    gap = np.einsum("kj,ji,ki->k", it.supports.weight, e, it.supports.axis) - it.supports.target
     assert_allclose(it.at(it.state).gap, gap, rtol=0, atol=2e-15)
 
 
@@ -231,7 +231,7 @@ def test_load_column(term, block, closed):
     """d2L/dq dload of the unknowns that are free, against differences of the gradient; 1e-9."""
     it = problem(term, "angle", block, closed, grips=True)
     system = it.at(it.state)
-    free = it.held.free
+    free = it.supports.free
     expected = classical.difference(lambda h: it.at(loaded(it, h)).grad)
     size = max(np.abs(system.load_column[free]).max(), np.abs(system.grad[free]).max())
     assert_allclose(system.load_column[free], expected[free], rtol=0, atol=1e-9 * size)
@@ -250,7 +250,7 @@ def test_load_border(block):
 def test_rigid_rotation_leaves_the_elastic_derivatives(closed, measure):
     """Objectivity: energy, gradient and Hessian live in the frames; 1e-13 of the largest entry."""
     it = problem("EI1", measure, 3, closed)
-    it = it._replace(body=it.body._replace(stiffness=np.array([1.3, 4.1, 0.9])))
+    it = it._replace(rod=it.rod._replace(stiffness=np.array([1.3, 4.1, 0.9])))
     before = it.at(it.state)
     quat = classical.spun(it.state.quat, np.array([1.0, -2.0, 0.5]))
     after = it.at(it.state.but(quat=quat))
@@ -276,7 +276,7 @@ def test_sign_of_a_quaternion_says_nothing(closed, measure):
 def test_elastic_moments_balance(closed, measure):
     """A free rod's gradient has no net moment, as energy does not see rigid rotations: 1e-13."""
     it = problem("EI1", measure, 3, closed)
-    it = it._replace(body=it.body._replace(stiffness=np.array([1.3, 4.1, 0.9])))
+    it = it._replace(rod=it.rod._replace(stiffness=np.array([1.3, 4.1, 0.9])))
     grad = it.at(it.state).grad
     net = np.einsum("jik,jk->i", rotation(it.state.quat), grad)
     assert_allclose(net, np.zeros(3), rtol=0, atol=1e-13 * np.abs(grad).max())
@@ -287,12 +287,12 @@ def test_elastic_moments_balance(closed, measure):
 def test_renumbering_round_a_ring(shift, measure):
     """A ring is topology: rolled arrays give rolled derivatives; resummed: 1e-14."""
     it = problem("EI1", measure, 3, closed=True)
-    body = it.body._replace(stiffness=np.array([1.3, 4.1, 0.9]))
-    rolled = body._replace(
-        **{name: np.roll(getattr(body, name), shift, axis=0) for name in ("cell", "length", "rest")}
+    rod = it.rod._replace(stiffness=np.array([1.3, 4.1, 0.9]))
+    rolled = rod._replace(
+        **{name: np.roll(getattr(rod, name), shift, axis=0) for name in ("cell", "length", "rest")}
     )
-    before = it._replace(body=body).at(it.state)
-    after = it._replace(body=rolled).at(it.state.but(quat=np.roll(it.state.quat, shift, axis=0)))
+    before = it._replace(rod=rod).at(it.state)
+    after = it._replace(rod=rolled).at(it.state.but(quat=np.roll(it.state.quat, shift, axis=0)))
     assert after.energy == pytest.approx(before.energy, rel=1e-14)
     for name in ("grad", "diag", "off"):
         one, other = np.roll(getattr(before, name), shift, axis=0), getattr(after, name)
@@ -303,22 +303,22 @@ def test_renumbering_round_a_ring(shift, measure):
 def test_straight_rod_has_a_finite_hessian(measure):
     """Phi = 0 at every vertex: the chain of springs K_k/cell, to a few roundings."""
     cell = np.array([0.5, 1.0, 2.0])
-    body = rod(cell, np.zeros(3), (1.3, 4.1, 0.9), measure=measure)
+    rod = discrete_rod(cell, np.zeros(3), (1.3, 4.1, 0.9), measure=measure)
     start = State(np.tile([1.0, 0.0, 0.0, 0.0], (4, 1)), np.zeros(4), np.zeros(0), 0.0)
-    system = Problem(body, supports(body), start).at(start)
+    system = Problem(rod, supported(rod), start).at(start)
     for s in range(3):
-        assert_allclose(system.off[s], -np.diag(body.stiffness) / cell[s], rtol=0, atol=2e-15)
+        assert_allclose(system.off[s], -np.diag(rod.stiffness) / cell[s], rtol=0, atol=2e-15)
     assert_allclose(system.grad, np.zeros((4, 3)), rtol=0, atol=1e-15)
 
 
 def bent_at(vertices: dict[int, float], axis: int, closed: bool) -> Problem:
     """Six edges in line but for turns [degrees] about one of their directors at some vertices."""
     n_s = 6 if closed else 5
-    body = rod(np.ones(n_s), np.zeros(n_s), (1.0, 1.0, 1.0), closed=closed)
+    rod = discrete_rod(np.ones(n_s), np.zeros(n_s), (1.0, 1.0, 1.0), closed=closed)
     angle = np.cumsum([0.0, *(np.deg2rad(vertices.get(s, 0.0)) for s in range(5))])
     quat = np.zeros((6, 4))
     quat[:, 0], quat[:, 1 + axis] = np.cos(0.5 * angle), np.sin(0.5 * angle)
-    return Problem(body, supports(body), State(quat, np.zeros(6), np.zeros(0), 0.0))
+    return Problem(rod, supported(rod), State(quat, np.zeros(6), np.zeros(0), 0.0))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2], ids=["d1", "d2", "twist"])
@@ -347,10 +347,10 @@ def test_closing_vertex_of_a_ring_is_reported():
 def test_take_out_leaves_the_identity_where_nothing_moves(block):
     """Rows and columns of held unknowns are those of the identity, the others are untouched."""
     it = problem("all", "angle", block, closed=False, grips=True)
-    it.held.free[2, 1] = False
+    it.supports.free[2, 1] = False
     system = it.at(it.state)
-    diag, off, border = take_out(it.held.free, system.diag, system.off, system.border)
-    free = it.held.free.ravel()
+    diag, off, border = take_out(it.supports.free, system.diag, system.off, system.border)
+    free = it.supports.free.ravel()
     expected = np.where(np.outer(free, free), dense(system, closed=False), np.eye(N * block))
     assert np.array_equal(dense(system._replace(diag=diag, off=off), closed=False), expected)
-    assert np.array_equal(border, np.where(it.held.free[:, :, None], system.border, 0.0))
+    assert np.array_equal(border, np.where(it.supports.free[:, :, None], system.border, 0.0))

@@ -8,12 +8,15 @@ from shapes import crescent
 
 import der
 from der.analysis.landscape.actuators import struts
-from der.analysis.landscape.landscape import scene_sector
-from der.kernels.planar import BENT, CONVERGED, PlanarRod, assemble_planar, negative_planar
-from der.rod.equilibrium import equilibrium
+from der.analysis.request import ring_of
+from der.continuation.arclength import follow
+from der.continuation.events import Events
+from der.errors import ContinuationFailed, Reason
+from der.kernels.planar import PlanarRod, assemble_planar, negative_planar
+from der.problem import Options
 from der.rod.free_ring import balance
-from der.rod.planar_march import BRANCH, FOLD, LIMIT, WHY, Lost, kinds, march, solved
 from der.rod.planar_ring import covered, eight, planar_ring, shapes
+from der.rod.planar_system import PlanarRodSystem, solved
 
 SECTION = der.rectangular_section(4.0)
 
@@ -91,10 +94,12 @@ def test_tangent_leads_along_the_path():
     at = solved(rod, np.append(flat.phi, 0.5 * math.pi), np.zeros(4), 0.8 * first)
     assert at.converged
     step = 1e-4
-    there = solved(rod, at.phi, at.force, at.load + step)
-    rate = step / at.load_rate
-    np.testing.assert_allclose(there.phi - at.phi, rate * at.phi_rate, atol=1e-6)
-    assert there.moment - at.moment == pytest.approx(rate * at.moment_rate, rel=1e-3)
+    there = solved(rod, at.phi, at.force, at.parameter + step)
+    rate = step / at.parameter_rate
+    jump = PlanarRodSystem(rod).difference(at.state, there.state)
+    np.testing.assert_allclose(jump[:33], rate * at.tangent[:33], atol=1e-6)
+    moment_rate = at.observables["moment"][1]
+    assert there.moment - at.moment == pytest.approx(rate * moment_rate, rel=1e-3)
     assert there.energy - at.energy == pytest.approx(0.5 * step * (at.moment + there.moment), 1e-6)
 
 
@@ -111,13 +116,13 @@ def test_a_squeezed_ring_is_that_of_the_rod_in_space(ring):
     rod, half = here.strutted(), 0.5 * math.pi
     middle = solved(rod, np.append(flat.phi, half), np.append(flat.force, [0, 0]), 0.9 * first)
     plane = solved(rod, middle.phi, middle.force, 0.8 * first)
-    whole = scene_sector(scene, "full")
-    start = balance(whole.body, whole.start.quat, whole.start.stretch)
-    tool = struts(start, (0, 16))[-1]
-    state = tool.piece.start
+    full = ring_of(scene, "full")
+    start = balance(full.rod, full.start.quat, full.start.stretch)
+    actuator = struts(start, (0, 16))[-1]
+    state = actuator.start
     for share in (0.1, 0.2):
-        there = tool.first - (1.0 - share) * first
-        space = equilibrium(tool.piece.body, tool.piece.held, state.but(load=there))
+        there = actuator.first - (1.0 - share) * first
+        space = actuator.system.correct(state.but(load=there))
         state = space.state
     assert plane.converged
     assert space.converged
@@ -163,9 +168,9 @@ def test_too_few_edges_are_named():
     """A vertex that turns by more than 160 degrees is refused, and named."""
     here = mesh(der.circle(), 8)
     at = solved(here.rod(5), covered(here, 5), np.zeros(2))
-    assert at.outcome == BENT
-    assert at.bent >= 0
-    assert "use more edges" in WHY[at.outcome]
+    assert at.reason is Reason.OUT_OF_RANGE
+    assert at.detail.startswith("vertex ")
+    assert "use more edges" in at.advice
 
 
 def softening(k=1.0):
@@ -189,26 +194,38 @@ def softening(k=1.0):
 def test_a_linear_spring_follows_its_load():
     """phi = load, without energy: what the kernels say of the least rod there is."""
     at = solved(softening(), np.zeros(2), np.zeros(0), 0.5)
-    assert at.outcome == CONVERGED
+    assert at.reason is Reason.CONVERGED
     assert at.phi[1] == pytest.approx(0.5, abs=1e-14)
-    *_, last = march(softening(), at, 1.0)
-    assert last.at.load == 1.0
-    assert last.at.energy == pytest.approx(0.0, abs=1e-20)
+    *_, last = to_goal(PlanarRodSystem(softening()), at, 1.0)
+    assert last.solution.parameter == 1.0
+    assert last.solution.energy == pytest.approx(0.0, abs=1e-20)
 
 
-def pulled(ring, n, goal):
-    """Rod and states of a flat ring whose points are drawn apart, to so many a."""
+def to_goal(system, start, goal, **options):
+    """Points of the path from a state to a load above its own."""
+    events = Events(
+        targets=(goal,),
+        stop=lambda at: at.parameter == goal,
+        limits=("moment",),
+        stability=True,
+    )
+    steps = Options(first_step=0.02, largest_step=0.08, sharpest_turn=0.45, **options)
+    return follow(system, start.state, events, options=steps)
+
+
+def pulled(ring, n, goal, **options):
+    """Rod and path of a flat ring whose points are drawn apart, to so many a."""
     here = mesh(ring, n)
     flat = solved(here.rod(1), covered(here, 1), np.zeros(2))
     first = float(here.way() @ (here.length * np.sin(flat.phi)))
     force = np.append(flat.force, [0.0, 0.0])
     start = solved(here.strutted(), np.append(flat.phi, 0.5 * math.pi), force, first)
-    return here.strutted(), march(here.strutted(), start, goal, special=True)
+    return here.strutted(), to_goal(PlanarRodSystem(here.strutted()), start, goal, **options)
 
 
 def eigenvalues(rod, at):
     """Of the Hessian among changes that keep the ring closed and the points apart, dense."""
-    system = assemble_planar(rod, at.phi, at.force, at.load)
+    system = assemble_planar(rod, at.phi, at.force, at.parameter)
     band = np.diag(system.diag[:, 0, 0])
     band += np.diag(system.off[:-1, 0, 0], 1) + np.diag(system.off[:-1, 0, 0], -1)
     free = np.linalg.qr(system.border[1:, 0], mode="complete")[0][:, len(at.force) :]
@@ -221,28 +238,35 @@ def test_index_and_special_points_are_those_of_dense_matrices():
     Its symmetry breaks and is mended (branch points: an eigenvalue is zero, the distance goes on),
     the force has two limits, and between them the distance turns back and forth again.
     """
-    rod, stops = pulled(crescent(0.01, 2.5), 256, 1.6)
-    stops = list(stops)
-    assert kinds(stops) == [BRANCH, LIMIT, FOLD, FOLD, BRANCH, LIMIT]
-    force = np.array([stop.at.moment for stop in stops])
-    for stop in stops[::8]:
-        if not stop.kind:
-            assert stop.at.index == np.sum(eigenvalues(rod, stop.at) < 0.0)
-    for k, stop in enumerate(stops):
-        if not stop.kind:
+    rod, path = pulled(crescent(0.01, 2.5), 256, 1.6)
+    points = list(path)
+    special = [point.kind for point in points if point.kind]
+    assert special == ["branch", "limit", "fold", "fold", "branch", "limit"]
+    force = np.array([point.solution.moment for point in points])
+    for point in points[::8]:
+        if not point.kind:
+            at = point.solution
+            assert point.index == (at.index,)
+            assert at.index == np.sum(eigenvalues(rod, at) < 0.0)
+    for k, point in enumerate(points):
+        if not point.kind:
             continue
-        gone = np.abs(eigenvalues(rod, stop.at)).min() < 1e-6
-        assert gone == (stop.kind != LIMIT)
-        if stop.kind == FOLD:
-            assert abs(stop.at.load_rate) < 1e-6
-        if stop.kind == LIMIT:
-            assert abs(stop.at.moment_rate) < 1e-5 * np.abs(force).max()
+        at = point.solution
+        gone = np.abs(eigenvalues(rod, at)).min() < 1e-6
+        assert gone == (point.kind != "limit")
+        if point.kind == "fold":
+            assert abs(at.parameter_rate) < 1e-6
+        if point.kind == "limit":
+            assert point.sides is None
+            assert abs(at.observables["moment"][1]) < 1e-5 * np.abs(force).max()
             assert (force[k - 1] - force[k]) * (force[k + 1] - force[k]) > 0.0
-        assert abs(stop.after - stop.before) == (stop.kind != LIMIT)
+        else:
+            (before,), (after,) = point.sides
+            assert abs(after - before) == 1
 
 
-def test_a_path_that_does_not_arrive_says_so(monkeypatch):
-    """In a sentence with the number of steps, and where it is."""
-    monkeypatch.setattr("der.rod.planar_march._MOST_STEPS", 3)
-    with pytest.raises(Lost, match="in 3 steps, at "):
-        list(pulled(crescent(0.05), 64, 1.0)[1])
+def test_a_path_that_does_not_arrive_says_so():
+    """In a sentence with the number of steps, and by its reason."""
+    with pytest.raises(ContinuationFailed, match="not ended after 3 steps") as caught:
+        list(pulled(crescent(0.05), 64, 1.0, max_steps=3)[1])
+    assert caught.value.reason is Reason.TOO_MANY_STEPS

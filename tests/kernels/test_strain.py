@@ -10,7 +10,7 @@ from scipy.special import hyp2f1, zeta
 
 from der.kernels.quaternions import turned
 from der.kernels.strain import _arc_coefficient, arctangent_quotient, vertex_energy
-from der.rod.rod import Rod, State, rod, strains
+from der.rod.rod import Rod, State, discrete_rod, strains
 
 MEASURES = ("logarithm", "angle", "tangent")
 NEGLIGIBLE = 1e-30  # a stiffness that leaves the other terms alone
@@ -36,7 +36,7 @@ def engine(
     """Rod and state of the engine with random cells and natural strains, in given frames."""
     rng = np.random.default_rng(seed + 100)
     n_s = len(frames.ref_twist)
-    body = rod(
+    rod = discrete_rod(
         rng.uniform(0.5, 1.5, size=n_s),
         rng.uniform(-0.4, 0.4, size=(n_s, 3)),
         stiffness,
@@ -44,7 +44,7 @@ def engine(
         closed=frames.closed,
     )
     quat = classical.quaternions(frames)
-    return body, State(quat, np.zeros(len(quat)), np.zeros(0), 0.0)
+    return rod, State(quat, np.zeros(len(quat)), np.zeros(0), 0.0)
 
 
 def relative_rotation(seed: int, angle: float | None = None) -> np.ndarray:
@@ -59,7 +59,7 @@ def relative_rotation(seed: int, angle: float | None = None) -> np.ndarray:
 def at_vertex(p, measure, rest, stiffness) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """Energy, strains, gradient and Hessian."""
     kappa, g, H = np.empty(3), np.empty(3), np.empty((3, 3))
-    number = rod([1.0], [0.0], (1.0, 1.0, 1.0), measure=measure).measure
+    number = discrete_rod([1.0], [0.0], (1.0, 1.0, 1.0), measure=measure).measure
     energy = vertex_energy(p, number, rest, stiffness, kappa, g, H)
     return energy, kappa, g, H
 
@@ -88,9 +88,9 @@ def test_strains_are_those_of_positions_and_material_angles(seed, closed, measur
 def test_energy_is_that_of_positions_and_material_angles(closed, measure, stiffness):
     """Each energy term alone, vertex by vertex, to the rounding of the strains: 2e-13 relative."""
     frames = classical.bent_and_twisted(np.random.default_rng(7), 7, closed=closed)
-    body, state = engine(7, frames, measure, stiffness)
-    expected = classical.energies(frames, measure, body.rest, stiffness, body.cell)
-    assert_allclose(strains(body, state)[1], expected, rtol=2e-13, atol=1e-14 * expected.max())
+    rod, state = engine(7, frames, measure, stiffness)
+    expected = classical.energies(frames, measure, rod.rest, stiffness, rod.cell)
+    assert_allclose(strains(rod, state)[1], expected, rtol=2e-13, atol=1e-14 * expected.max())
 
 
 @EVERY_MEASURE
@@ -105,7 +105,7 @@ def test_time_parallel_motion_is_turning_frames(seed, closed, measure):
     """
     rng = np.random.default_rng(seed)
     frames = classical.bent_and_twisted(rng, 6, closed=closed)
-    body, state = engine(seed, frames, measure)
+    rod, state = engine(seed, frames, measure)
     quat = state.quat
     for _ in range(6):
         d1, d2, d3 = classical.material_frames(frames)
@@ -118,7 +118,7 @@ def test_time_parallel_motion_is_turning_frames(seed, closed, measure):
         w1, w2 = np.sum(axis * d1, axis=1), np.sum(axis * d2, axis=1)
         quat = turned_all(quat, np.column_stack([w1, w2, 0.0 * w1]))
         quat = turned_all(quat, np.column_stack([0.0 * w1, 0.0 * w1, dtheta]))
-    kappa, _ = strains(body, state.but(quat=quat))
+    kappa, _ = strains(rod, state.but(quat=quat))
     assert_allclose(kappa, classical.strains(frames, measure), rtol=0, atol=1e-13)
 
 
@@ -129,8 +129,8 @@ def test_reference_frames_are_a_gauge(closed, measure):
     rng = np.random.default_rng(5)
     frames = classical.bent_and_twisted(rng, 7, closed=closed)
     other = classical.regauged(frames, rng.uniform(-6.0, 6.0, size=7))
-    body, state = engine(5, other, measure)
-    kappa, _ = strains(body, state)
+    rod, state = engine(5, other, measure)
+    kappa, _ = strains(rod, state)
     assert_allclose(kappa, classical.strains(frames, measure), rtol=0, atol=4e-14)
 
 
@@ -139,10 +139,10 @@ def test_reference_frames_are_a_gauge(closed, measure):
 def test_sign_of_a_quaternion_says_nothing(closed, measure):
     """q and -q are one frame: strains and energies agree to the last digit."""
     rng = np.random.default_rng(6)
-    body, state = engine(6, classical.bent_and_twisted(rng, 7, closed=closed), measure)
+    rod, state = engine(6, classical.bent_and_twisted(rng, 7, closed=closed), measure)
     sign = np.where(np.arange(7) % 3 == 0, -1.0, 1.0)[:, None]
     for one, other in zip(
-        strains(body, state), strains(body, state.but(quat=sign * state.quat)), strict=True
+        strains(rod, state), strains(rod, state.but(quat=sign * state.quat)), strict=True
     ):
         assert np.array_equal(one, other)
 
@@ -152,10 +152,10 @@ def test_sign_of_a_quaternion_says_nothing(closed, measure):
 def test_rigid_rotation_leaves_strains(closed, measure):
     """Objectivity: strains see relative rotations only; a few roundings, as above."""
     frames = classical.bent_and_twisted(np.random.default_rng(8), 7, closed=closed)
-    body, state = engine(8, frames, measure)
+    rod, state = engine(8, frames, measure)
     turned_rod = state.but(quat=classical.spun(state.quat, np.array([1.0, -2.0, 0.5])))
-    kappa, _ = strains(body, turned_rod)
-    assert_allclose(kappa, strains(body, state)[0], rtol=0, atol=2e-14)
+    kappa, _ = strains(rod, turned_rod)
+    assert_allclose(kappa, strains(rod, state)[0], rtol=0, atol=2e-14)
 
 
 @EVERY_MEASURE

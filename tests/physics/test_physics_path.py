@@ -6,6 +6,7 @@ the ring and GJ are 1; Poisson's ratio 0.3. Bounds are three times what was meas
 
 import functools
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,11 +17,13 @@ from scipy.interpolate import make_interp_spline
 
 import der
 from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error, read_reference
-from der.continuation.arclength import Tally, Wanted, follow
+from der.analysis.request import Request
 from der.kernels.linking import link, twist
-from der.rod.gripped_ring import sector
+from der.problem import Options
+from der.rod.gripped_ring import gripped_ring
 
 REFERENCE = Path(__file__).parents[2] / "validation" / "reference"
+BARE = Request(targets=(), stability=False, self_crossings=False)
 NAMES = {4.0: "circ_ht4", 1.6: "circ_ht1.6", 1.0: "circ_ht1_beyond_pi"}
 
 
@@ -160,19 +163,18 @@ def test_folds_beyond_pi():
 
 
 @pytest.mark.parametrize("h_over_t", [4.0, 1.6])
-def test_work_of_the_grips_is_the_energy(h_over_t, monkeypatch):
+def test_work_of_the_grips_is_the_energy(h_over_t):
     """U(end) - U(0) = 4 x the signed integral of M dgamma, snap-backs included, on any mesh.
 
     Truth: dU/dgamma = 4 M (two grips, two arms). States a tenth as far apart as usual; quintic
     splines over the chord length, measured 7e-9 and 2e-10 of 9.7 and 13.4.
     """
-    monkeypatch.setattr("der.continuation.arclength._ANGLE", 0.012)
-    piece = sector(der.circle(), der.rectangular_section(h_over_t), 64)
-    wanted = Wanted(targets=(), stability=False, contacts=False)
-    states = [visit.at for visit in follow(piece, wanted, Tally()) if not visit.kind]
-    gamma = np.array([at.state.load for at in states])
-    moment = np.array([piece.moment(at.moment) for at in states])
-    energy = np.array([piece.copies * at.energy for at in states])
+    ring = gripped_ring(der.circle(), der.rectangular_section(h_over_t), 64)
+    request = replace(BARE, options=Options(aimed_turn=0.012))
+    states = [one.solution for one in request.follow(ring) if not one.kind]
+    gamma = np.array([at.parameter for at in states])
+    moment = np.array([ring.arm_moment(at.moment) for at in states])
+    energy = np.array([ring.copies * at.energy for at in states])
     steps = np.hypot(np.diff(gamma), np.diff(moment))
     s = np.concatenate([[0.0], np.cumsum(steps)])
     curve = make_interp_spline(s, np.column_stack([gamma, moment]), k=5)
@@ -193,19 +195,18 @@ def test_link_is_an_integer_along_the_path(h_over_t):
     Measured 1.4e-10, rounding where strands are close. Contacts are left out, where a strand passes
     through another, and the folded state, where the three loops lie in each other.
     """
-    piece = sector(der.circle(), der.rectangular_section(h_over_t), 64)
-    wanted = Wanted(load_max=6.0, until_folded=True, stability=False)
-    visits = list(follow(piece, wanted, Tally()))
+    ring = gripped_ring(der.circle(), der.rectangular_section(h_over_t), 64)
+    found = list(Request(gamma_max=6.0, until_folded=True, stability=False).follow(ring))
     misses = [
-        link(visit.at.state.quat, piece.lengths(visit.at.state), piece.copies)[1]
-        for visit in visits[:-1]
-        if visit.kind != "contact"
+        link(one.solution.state.quat, ring.lengths(one.solution.state), ring.copies)[1]
+        for one in found[:-1]
+        if one.kind != "contact"
     ]
     assert len(misses) > 20
     assert max(misses) < 1e-9
 
 
-def test_twist_is_continuous_along_the_path(monkeypatch):
+def test_twist_is_continuous_along_the_path():
     """Tw changes little between neighbouring states, where Lk jumps by 4 at the contacts.
 
     With states a quarter as far apart the largest change of Tw is
@@ -213,12 +214,10 @@ def test_twist_is_continuous_along_the_path(monkeypatch):
     """
 
     def largest_change(angle: float, longest: float) -> float:
-        monkeypatch.setattr("der.continuation.arclength._ANGLE", angle)
-        monkeypatch.setattr("der.continuation.arclength.LARGEST_STEP", longest)
-        piece = sector(der.circle(), der.rectangular_section(4.0), 64)
-        wanted = Wanted(targets=(), stability=False, contacts=False)
-        visits = follow(piece, wanted, Tally())
-        turns = [twist(piece.full_frames(visit.at.state)) for visit in visits]
+        request = replace(BARE, options=Options(aimed_turn=angle, largest_step=longest))
+        ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 64)
+        found = request.follow(ring)
+        turns = [twist(ring.full_frames(one.solution.state)) for one in found]
         return max(abs(b - a) for a, b in pairwise(turns))
 
     coarse, fine = largest_change(0.12, 0.2), largest_change(0.03, 0.05)

@@ -20,10 +20,16 @@ from rods import (
 from scipy.optimize import brentq
 
 from der import circle, rectangular_section
-from der.rod.gripped_ring import free_ring, sector
-from der.rod.stability import raw_index
+from der.problem import total_index
+from der.rod.gripped_ring import free_supports, gripped_ring
+from der.rod.system import RodSystem
 
 MESHES = (64, 128, 256)
+
+
+def free(rod):
+    """The system of a closed rod without grips."""
+    return RodSystem(rod, free_supports(rod))
 
 
 # --- free of grips --------------------------------------------------------------------------
@@ -62,10 +68,9 @@ def test_index_of_covered_circles(n, kappa0):
     """
     for h_over_t in (0.7, 1.3, 1.7, 2.5, 4.0, 7.0):
         bar = rectangular_section(h_over_t)
-        body, state = covered_circle(n, kappa0, (bar.alpha, bar.beta, 1.0), 96)
-        held = free_ring(body)
+        rod, state = covered_circle(n, kappa0, (bar.alpha, bar.beta, 1.0), 96)
         expected = covered_index(n, bar.alpha, bar.beta, kappa0)
-        assert index_of(body, held, state) == expected, f"h/t = {h_over_t}"
+        assert index_of(free(rod), state) == expected, f"h/t = {h_over_t}"
 
 
 def three_covered_threshold(n_edges, kappa0=1.0, **measure):
@@ -77,8 +82,8 @@ def three_covered_threshold(n_edges, kappa0=1.0, **measure):
     def softest(h_over_t):
         bar = rectangular_section(h_over_t)
         stiffness = (bar.alpha, bar.beta, 1.0)
-        body, state = covered_circle(3, kappa0, stiffness, n_edges, **measure)
-        return on_conditions(*dense(body, free_ring(body), state))[0]
+        rod, state = covered_circle(3, kappa0, stiffness, n_edges, **measure)
+        return on_conditions(*dense(free(rod), state))[0]
 
     return brentq(softest, 3.0, 4.5, xtol=1e-9)
 
@@ -116,8 +121,8 @@ def flat_ring_threshold(stable, unstable):
 
     def critical(n_edges):
         def index(kappa0):
-            body, state = covered_circle(1, kappa0, (0.9, 2.5, 1.0), n_edges)
-            return index_of(body, free_ring(body), state)
+            rod, state = covered_circle(1, kappa0, (0.9, 2.5, 1.0), n_edges)
+            return index_of(free(rod), state)
 
         assert index(stable) == 0
         return first_change(index, stable, unstable)
@@ -169,9 +174,9 @@ def flat_slope(alpha, beta):
 def slopes(h_over_t, folded):
     """Slopes dM/dgamma on three meshes, at gamma = pi (folded) or 0."""
     for n_edges in MESHES:
-        piece = sector(circle(), rectangular_section(h_over_t), n_edges)
-        start = three_covered(piece) if folded else piece.start
-        yield piece.moment(solved(piece.body, piece.held, start).slope)
+        ring = gripped_ring(circle(), rectangular_section(h_over_t), n_edges)
+        start = three_covered(ring) if folded else ring.start
+        yield ring.arm_moment(solved(ring, start).slope)
 
 
 @pytest.mark.parametrize(
@@ -216,10 +221,10 @@ def test_slopes_converge_with_the_square_of_the_cell(h_over_t, folded):
 def test_the_folded_circle_is_an_equilibrium_without_moment():
     """Three covers, curvature 3 everywhere: M = 0 and U = 4 pi alpha, on any mesh, to rounding."""
     bar = rectangular_section(4)
-    piece = sector(circle(), bar, 32)
-    at = solved(piece.body, piece.held, three_covered(piece))
-    assert piece.moment(at.moment) == pytest.approx(0.0, abs=1e-13)
-    assert piece.copies * at.energy == pytest.approx(4 * np.pi * bar.alpha, rel=1e-14)
+    ring = gripped_ring(circle(), bar, 32)
+    at = solved(ring, three_covered(ring))
+    assert ring.arm_moment(at.moment) == pytest.approx(0.0, abs=1e-13)
+    assert ring.copies * at.energy == pytest.approx(4 * np.pi * bar.alpha, rel=1e-14)
 
 
 def test_holding_the_moment_adds_one_where_the_slope_is_negative():
@@ -230,13 +235,13 @@ def test_holding_the_moment_adds_one_where_the_slope_is_negative():
     matrices of the full ring.
     """
     bar = rectangular_section(1.6)
-    quarter, full = (sector(circle(), bar, 32, name=name) for name in ("quarter", "full"))
+    quarter, full = (gripped_ring(circle(), bar, 32, name=name) for name in ("quarter", "full"))
     seen = set()
-    for on_path in walk(quarter, 0.25, lambda at: at.state.load > 3.3):
+    for on_path in walk(quarter, 0.25, lambda at: at.parameter > 3.3):
         at = lifted(quarter, on_path.state, full)
         with_angle, with_moment = (
-            int(np.sum(on_conditions(*dense(full.body, full.held, at.state, load_free=free)) < 0))
-            for free in (False, True)
+            int(np.sum(on_conditions(*dense(full, at.state, load_free=load_free)) < 0))
+            for load_free in (False, True)
         )
         assert with_moment == with_angle + (at.slope < 0)
         seen.add((with_angle, with_moment))
@@ -251,25 +256,24 @@ def test_the_index_of_the_ring_is_the_sum_over_its_classes():
     1 and 3; the full ring's from a dense matrix.
     """
     bar = rectangular_section(1.0)
-    quarter, half, full = (sector(circle(), bar, 32, name=s) for s in ("quarter", "half", "full"))
+    quarter, half, full = (
+        gripped_ring(circle(), bar, 32, name=s) for s in ("quarter", "half", "full")
+    )
 
-    def total(piece, state):
-        return sum(
-            times * raw_index(piece.body, piece.held, modes, state)
-            for times, modes in piece.classes.values()
-        )
+    def total(ring, state):
+        return total_index(ring, tuple(ring.count(state, name) for name in ring.classes))
 
     loads, seen = [], []
 
     def came_back(at):
-        loads.append(at.state.load)
-        return max(loads) > 5.4 and at.state.load < 3.2
+        loads.append(at.parameter)
+        return max(loads) > 5.4 and at.parameter < 3.2
 
     for at in walk(quarter, 0.3, came_back):
-        whole = lifted(quarter, at.state, full).state
-        expected = int(np.sum(on_conditions(*dense(full.body, full.held, whole)) < 0))
+        ring = lifted(quarter, at.state, full).state
+        expected = int(np.sum(on_conditions(*dense(full, ring)) < 0))
         arm = lifted(quarter, at.state, half).state
-        counted = [total(quarter, at.state), total(half, arm), total(full, whole)]
-        assert counted == [expected] * 3, f"gamma = {at.state.load}"
+        counted = [total(quarter, at.state), total(half, arm), total(full, ring)]
+        assert counted == [expected] * 3, f"gamma = {at.parameter}"
         seen.append(expected)
     assert set(seen) == {0, 1, 3}

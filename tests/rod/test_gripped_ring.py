@@ -1,4 +1,4 @@
-"""A gripped ring as a quarter, a half or the whole: one ring, three problems."""
+"""A gripped ring as a quarter, a half or the full ring: one ring, three problems."""
 
 import math
 from functools import cache
@@ -12,10 +12,9 @@ from der import Ring, circle, ellipse, rectangle, rectangular_section, triangle
 from der.geometry.mesh import sites
 from der.kernels.assembly import System, assemble
 from der.kernels.quaternions import rotation
-from der.rod.equilibrium import equilibrium
-from der.rod.gripped_ring import Sector, free_ring, sector
-from der.rod.rod import State, rod
-from der.rod.supports import supports
+from der.rod.gripped_ring import GrippedRing, free_supports, gripped_ring
+from der.rod.rod import State, discrete_rod
+from der.rod.supports import supported
 
 SECTORS = ("full", "half", "quarter")
 SECTION = rectangular_section(h_over_t=4)
@@ -29,60 +28,62 @@ D2 = {
     "rectangle": rectangle(0.6, 0.3),
 }
 RINGS = {**D2, "triangle": triangle(1.2, 0.1)}
-PIECES = pytest.mark.parametrize(
+SECTORS_OF_RINGS = pytest.mark.parametrize(
     ("shape", "name"), [(r, s) for r in RINGS for s in SECTORS if s != "quarter" or r in D2]
 )
 
 
-def at(piece: Sector, state: State) -> System:
-    """The piece's Lagrangian and its derivatives."""
+def at(ring: GrippedRing, state: State) -> System:
+    """The sector's Lagrangian and its derivatives."""
     return assemble(
-        piece.body, piece.held, state.quat, state.stretch, state.force, float(state.load)
+        ring.rod, ring.supports, state.quat, state.stretch, state.force, float(state.load)
     )
 
 
-def start(piece: Sector) -> System:
+def start(ring: GrippedRing) -> System:
     """The same on the flat ring, without forces."""
-    return at(piece, piece.start)
+    return at(ring, ring.start)
 
 
 @cache
-def twisted(shape: str, name: str, gamma: float, stretching: float = 0.0) -> tuple[Sector, State]:
+def twisted(
+    shape: str, name: str, gamma: float, stretching: float = 0.0
+) -> tuple[GrippedRing, State]:
     """Equilibrium of a sector with grips turned by ``gamma``, reached in steps of 0.3."""
-    piece = sector(RINGS[shape], SECTION, N, name=name, stretching=stretching)
-    state = piece.start
+    ring = gripped_ring(RINGS[shape], SECTION, N, name=name, stretching=stretching)
+    state = ring.start
     axis = np.array([0.0, 0.0, 1.0])
     for load in np.linspace(0.0, gamma, 1 + math.ceil(gamma / 0.3))[1:]:
         # d1 tilts with the grips, which spares Newton's method the first guess
-        w = piece.held.turn[:, None] * (load - state.load) * axis
+        w = ring.supports.turn[:, None] * (load - state.load) * axis
         quat = classical.spun(state.quat, w)
-        found = equilibrium(piece.body, piece.held, state.but(quat=quat, load=float(load)))
-        assert found.converged, found.outcome
+        found = ring.correct(state.but(quat=quat, load=float(load)))
+        assert found.converged, found.advice
         state = found.state
-    return piece, state
+    return ring, state
 
 
-def on(name: str, shape: str, gamma: float, stretching: float) -> tuple[Sector, State, float]:
+def on(name: str, shape: str, gamma: float, stretching: float) -> tuple[GrippedRing, State, float]:
     """The state of the smallest sector seen by another, with forces fitted, and what they leave.
 
     The gradient is linear in the forces of the position conditions.
     """
     small, state = twisted(shape, "quarter" if shape in D2 else "half", gamma, stretching)
-    piece = sector(RINGS[shape], SECTION, N, name=name, stretching=stretching)
+    ring = gripped_ring(RINGS[shape], SECTION, N, name=name, stretching=stretching)
     part = {
         "full": slice(None),
         "half": slice(0, N // 2 + 1),
         "quarter": slice(N // 4, N // 2 + 1),
     }[name]
     quat = np.ascontiguousarray(small.full_frames(state)[part])
-    whole = sector(RINGS[shape], SECTION, N, name="full", stretching=stretching).body.length
-    stretch = (small.full_lengths(state) / whole - 1.0)[part]
-    seen = State(quat, stretch, np.zeros(len(piece.held.target)), gamma)
-    system, free = at(piece, seen), piece.held.free
+    rest = gripped_ring(RINGS[shape], SECTION, N, name="full", stretching=stretching).rod.length
+    stretch = (small.full_lengths(state) / rest - 1.0)[part]
+    seen = State(quat, stretch, np.zeros(len(ring.supports.target)), gamma)
+    system, free = at(ring, seen), ring.supports.free
     force, *_ = np.linalg.lstsq(system.border[free], -system.grad[free])
     seen = seen.but(force=force)
-    system = at(piece, seen)
-    return piece, seen, max(np.abs(system.grad[free]).max(), np.abs(system.gap).max())
+    system = at(ring, seen)
+    return ring, seen, max(np.abs(system.grad[free]).max(), np.abs(system.gap).max())
 
 
 # --- layout ---------------------------------------------------------------------------------
@@ -91,23 +92,23 @@ def on(name: str, shape: str, gamma: float, stretching: float) -> tuple[Sector, 
 @pytest.mark.parametrize(("name", "n"), [("full", 16), ("half", 9), ("quarter", 5)])
 def test_number_of_frames(name, n):
     """N, N/2 + 1 and N/4 + 1: grips and free points lie on the middles of edges."""
-    piece = sector(circle(), SECTION, N, name=name)
-    assert piece.body.n_edges == n == len(piece.start.quat) == len(piece.arc_length)
+    ring = gripped_ring(circle(), SECTION, N, name=name)
+    assert ring.rod.n_edges == n == len(ring.start.quat) == len(ring.arc_length)
 
 
 @EVERY_SECTOR
 def test_copies_make_the_ring(name):
     """Lengths of edges and cells times the copies are the ring's, to rounding."""
-    piece = sector(ellipse(0.6), SECTION, N, name=name)
+    ring = gripped_ring(ellipse(0.6), SECTION, N, name=name)
     length = ellipse(0.6).length
-    assert piece.copies * piece.body.length.sum() == pytest.approx(length, rel=1e-14)
-    assert piece.copies * piece.body.cell.sum() == pytest.approx(length, rel=1e-14)
+    assert ring.copies * ring.rod.length.sum() == pytest.approx(length, rel=1e-14)
+    assert ring.copies * ring.rod.cell.sum() == pytest.approx(length, rel=1e-14)
 
 
 @pytest.mark.parametrize(("shape", "name"), [("ellipse", "quarter"), ("triangle", "half")])
 def test_auto_is_the_smallest_sector(shape, name):
     """A quarter where the ring has three half-turns (D2), else a half."""
-    assert sector(RINGS[shape], SECTION, N).name == name
+    assert gripped_ring(RINGS[shape], SECTION, N).name == name
 
 
 @pytest.mark.parametrize(
@@ -116,9 +117,9 @@ def test_auto_is_the_smallest_sector(shape, name):
 )
 def test_grips_turn_against_each_other(name, turn):
     """+gamma at s = 0, -gamma at s = L/2, about E3; nothing else turns."""
-    held = sector(circle(), SECTION, N, name=name).held
-    assert {int(j): held.turn[j] for j in np.flatnonzero(held.turn)} == turn
-    assert np.array_equal(held.turn_axis, [0.0, 0.0, 1.0])
+    supports = gripped_ring(circle(), SECTION, N, name=name).supports
+    assert {int(j): supports.turn[j] for j in np.flatnonzero(supports.turn)} == turn
+    assert np.array_equal(supports.turn_axis, [0.0, 0.0, 1.0])
 
 
 @EVERY_SECTOR
@@ -128,12 +129,12 @@ def test_grips_hold_frame_and_length(name, stretching):
 
     There only the turn about d2 = E2, and the stretch, go with the half-turn about E2.
     """
-    piece = sector(circle(), SECTION, N, name=name, stretching=stretching)
-    free = piece.held.free
-    grips = piece.held.turn != 0.0
+    ring = gripped_ring(circle(), SECTION, N, name=name, stretching=stretching)
+    free = ring.supports.free
+    grips = ring.supports.turn != 0.0
     assert not free[grips].any()
     if name == "quarter":
-        assert free[0].tolist() == [False, True, False, True][: piece.body.block]
+        assert free[0].tolist() == [False, True, False, True][: ring.rod.block]
         grips[0] = True
     assert free[~grips].all()
 
@@ -141,8 +142,8 @@ def test_grips_hold_frame_and_length(name, stretching):
 @EVERY_SECTOR
 def test_grips_and_free_points_lie_on_the_axes(name):
     """Middles of edges 0 and N/2 on -E3 and +E3, of N/4 and 3N/4 on E2; rounding of the sum."""
-    piece = sector(ellipse(0.6), SECTION, N, name=name)
-    x, _ = piece.shape(piece.start)
+    ring = gripped_ring(ellipse(0.6), SECTION, N, name=name)
+    x, _ = ring.shape(ring.start)
     middle = 0.5 * (x + np.roll(x, 1, axis=0))
     off_axis = [middle[0, :2], middle[8, :2], middle[4, ::2], middle[12, ::2]]
     assert_allclose(off_axis, np.zeros((4, 2)), rtol=0, atol=1e-14)
@@ -152,8 +153,8 @@ def test_grips_and_free_points_lie_on_the_axes(name):
 @EVERY_SECTOR
 def test_flat_circle_is_a_regular_polygon(name):
     """Sides h = 2 pi/N, tangent directions: circumradius h/(2 sin(h/2)); d1 = E1. Rounding."""
-    piece = sector(circle(), SECTION, N, name=name)
-    x, frames = piece.shape(piece.start)
+    ring = gripped_ring(circle(), SECTION, N, name=name)
+    x, frames = ring.shape(ring.start)
     h = 2.0 * np.pi / N
     s = h * (np.arange(N) + 0.5)
     radius = 0.5 * h / np.sin(0.5 * h)
@@ -162,34 +163,34 @@ def test_flat_circle_is_a_regular_polygon(name):
     assert_allclose(frames[:, 0], np.tile([1.0, 0.0, 0.0], (N, 1)), rtol=0, atol=1e-15)
 
 
-@PIECES
+@SECTORS_OF_RINGS
 def test_flat_ring_has_the_shape_of_the_ring(shape, name):
     """Vertices lie where the curve does, to second order: the error falls 3.5 times or more.
 
     From 64 to 128 edges; 4 in the limit. The curves have corners of finite radius only.
     """
-    ring = RINGS[shape]
+    curve = RINGS[shape]
 
     def error(n: int) -> float:
-        piece = sector(ring, SECTION, n, name=name)
-        x, _ = piece.shape(piece.start)
-        s = sites(ring, n, "full")
+        ring = gripped_ring(curve, SECTION, n, name=name)
+        x, _ = ring.shape(ring.start)
+        s = sites(curve, n, "full")
         s = 0.5 * (s[1:] + s[:-1])
-        return float(np.sqrt(np.mean((x - ring.position(s)) ** 2)))
+        return float(np.sqrt(np.mean((x - curve.position(s)) ** 2)))
 
     assert error(128) < error(64) / 3.5
 
 
-@PIECES
+@SECTORS_OF_RINGS
 @STRETCHING
 def test_modes_of_the_classes_are_those_of_the_ring(shape, name, stretching):
     """Degrees of freedom less conditions, class by class and with multiplicity, miss no mode."""
 
     def modes(name: str) -> int:
-        piece = sector(RINGS[shape], SECTION, N, name=name, stretching=stretching)
+        ring = gripped_ring(RINGS[shape], SECTION, N, name=name, stretching=stretching)
         return sum(
             times * (int(some.free.sum()) - len(some.axis))
-            for times, some in piece.classes.values()
+            for times, some in ring.symmetry.values()
         )
 
     assert modes(name) == modes("full")
@@ -214,13 +215,13 @@ def test_modes_of_the_classes_are_those_of_the_ring(shape, name, stretching):
 def test_impossible_sectors_are_refused(ring: Ring, n_edges, name, message):
     """ValueError at the door, with the argument, what is allowed and what was given."""
     with pytest.raises(ValueError, match=message):
-        sector(ring, SECTION, n_edges, name=name)
+        gripped_ring(ring, SECTION, n_edges, name=name)
 
 
 def test_unknown_measure_is_refused():
     """By name, with the ones there are."""
     with pytest.raises(ValueError, match=r"curvature must be one of .*angle.*got 'cosine'"):
-        sector(circle(), SECTION, N, measure="cosine")
+        gripped_ring(circle(), SECTION, N, measure="cosine")
 
 
 @pytest.mark.parametrize(
@@ -238,14 +239,14 @@ def test_impossible_rods_are_refused(change, message):
     """ValueError with the argument and the value."""
     good = {"cell": [1.0, 1.0], "rest": [0.0, 0.0], "stiffness": (1.0, 1.0, 1.0)}
     with pytest.raises(ValueError, match=message):
-        rod(**{**good, **change})
+        discrete_rod(**{**good, **change})
 
 
 def test_edge_that_turns_must_be_clamped():
     """Else its frame would be both free and prescribed."""
-    body = rod([1.0, 1.0], [0.0, 0.0], (1.0, 1.0, 1.0))
+    rod = discrete_rod([1.0, 1.0], [0.0, 0.0], (1.0, 1.0, 1.0))
     with pytest.raises(ValueError, match="edge 2 turns"):
-        supports(body, clamped=(0,), turn={2: 1.0})
+        supported(rod, clamped=(0,), turn={2: 1.0})
 
 
 # --- the flat ring --------------------------------------------------------------------------
@@ -256,7 +257,9 @@ def test_edge_that_turns_must_be_clamped():
 @pytest.mark.parametrize("measure", ["logarithm", "angle"])
 def test_naturally_circular_ring_is_free_of_stress(measure, stretching, name):
     """Natural curvature 1: no energy, no gradient, no gap; rounding of angles times EI2/h = 80."""
-    system = start(sector(circle(), SECTION, N, name=name, measure=measure, stretching=stretching))
+    system = start(
+        gripped_ring(circle(), SECTION, N, name=name, measure=measure, stretching=stretching)
+    )
     assert system.energy < 1e-28
     assert_allclose(system.grad, np.zeros_like(system.grad), rtol=0, atol=1e-13)
     assert_allclose(system.gap, np.zeros_like(system.gap), rtol=0, atol=1e-14)
@@ -267,33 +270,33 @@ def test_naturally_circular_ring_is_free_of_stress(measure, stretching, name):
 @pytest.mark.parametrize("curvature", [-1.0, 0.0, 0.5, 2.0])
 def test_energy_of_a_flat_ring_of_natural_curvature(curvature, measure, name):
     """U = pi alpha (1 - K)^2 (a = 1, EI1 = alpha), exact for measures of the angle: rounding."""
-    piece = sector(circle(curvature), SECTION, N, name=name, measure=measure)
+    ring = gripped_ring(circle(curvature), SECTION, N, name=name, measure=measure)
     expected = math.pi * SECTION.alpha * (1.0 - curvature) ** 2
-    assert piece.copies * start(piece).energy == pytest.approx(expected, rel=1e-13)
+    assert ring.copies * start(ring).energy == pytest.approx(expected, rel=1e-13)
 
 
 @EVERY_SECTOR
 def test_flat_ring_of_any_natural_curvature_is_an_equilibrium(name):
     """A constant moment balances itself: no gradient where the ring is free to move; rounding."""
-    piece = sector(circle(0.3), SECTION, N, name=name)
-    system, free = start(piece), piece.held.free
+    ring = gripped_ring(circle(0.3), SECTION, N, name=name)
+    system, free = start(ring), ring.supports.free
     assert_allclose(system.grad[free], 0.0, rtol=0, atol=1e-13)
 
 
-@PIECES
+@SECTORS_OF_RINGS
 def test_flat_ring_has_no_moment(shape, name):
     """U is even in gamma, as reflection in the plane changes its sign; rounding."""
-    piece = sector(RINGS[shape], SECTION, N, name=name)
-    assert piece.moment(start(piece).load_grad) == pytest.approx(0.0, abs=1e-13)
+    ring = gripped_ring(RINGS[shape], SECTION, N, name=name)
+    assert ring.arm_moment(start(ring).load_grad) == pytest.approx(0.0, abs=1e-13)
 
 
 def test_free_flat_ring_is_in_equilibrium():
     """Closed and without grips: no gradient, no gap; only edge 0's rotation is held."""
-    body = sector(circle(), SECTION, N, name="full", stretching=40.0).body
-    held = free_ring(body)
-    flat = sector(circle(), SECTION, N, name="full").start
-    system = assemble(body, held, flat.quat, flat.stretch, np.zeros(3), 0.0)
-    assert (~held.free).sum() == 3
+    rod = gripped_ring(circle(), SECTION, N, name="full", stretching=40.0).rod
+    supports = free_supports(rod)
+    flat = gripped_ring(circle(), SECTION, N, name="full").start
+    system = assemble(rod, supports, flat.quat, flat.stretch, np.zeros(3), 0.0)
+    assert (~supports.free).sum() == 3
     assert_allclose(system.grad, np.zeros((N, 4)), rtol=0, atol=1e-13)
     assert_allclose(system.gap, np.zeros(3), rtol=0, atol=1e-14)
 
@@ -321,21 +324,21 @@ def test_equilibrium_of_a_sector_is_one_of_the_ring(shape, name, stretching):
 @STRETCHING
 def test_energy_of_a_sector_times_copies_is_that_of_the_ring(shape, name, stretching):
     """The same vertices and edges, counted once or by copies: rounding."""
-    piece, seen, _ = on(name, shape, 0.6, stretching)
+    ring, seen, _ = on(name, shape, 0.6, stretching)
     small, state = twisted(shape, "quarter" if shape in D2 else "half", 0.6, stretching)
     expected = small.copies * at(small, state).energy
-    assert piece.copies * at(piece, seen).energy == pytest.approx(expected, rel=1e-12)
+    assert ring.copies * at(ring, seen).energy == pytest.approx(expected, rel=1e-12)
 
 
 @BIGGER
 @STRETCHING
 def test_moment_of_an_arm_is_that_of_the_ring(shape, name, stretching):
     """M = (1/4) dU/dgamma of the full ring from each sector; residuals of 1e-10: 1e-8."""
-    piece, seen, _ = on(name, shape, 0.6, stretching)
+    ring, seen, _ = on(name, shape, 0.6, stretching)
     small, state = twisted(shape, "quarter" if shape in D2 else "half", 0.6, stretching)
-    expected = small.moment(at(small, state).load_grad)
+    expected = small.arm_moment(at(small, state).load_grad)
     assert expected > 0.1
-    assert piece.moment(at(piece, seen).load_grad) == pytest.approx(expected, rel=1e-8)
+    assert ring.arm_moment(at(ring, seen).load_grad) == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("shape", RINGS)
@@ -343,14 +346,14 @@ def test_moment_of_an_arm_is_that_of_the_ring(shape, name, stretching):
 def test_moment_is_a_quarter_of_the_slope_of_energy(shape, stretching):
     """M = (1/4) dU/dgamma along equilibria; a stencil of fourth order, h = 0.02: 1e-6."""
     name = "quarter" if shape in D2 else "half"
-    piece, state = twisted(shape, name, 0.6, stretching)
+    ring, state = twisted(shape, name, 0.6, stretching)
 
     def energy(h: float) -> float:
         found, there = twisted(shape, name, 0.6 + h, stretching)
         return found.copies * at(found, there).energy
 
     slope = classical.difference(energy, 0.02)
-    assert piece.moment(at(piece, state).load_grad) == pytest.approx(0.25 * slope, rel=1e-6)
+    assert ring.arm_moment(at(ring, state).load_grad) == pytest.approx(0.25 * slope, rel=1e-6)
 
 
 @pytest.mark.parametrize("shape", RINGS)
@@ -382,9 +385,9 @@ def test_free_points_stay_on_their_axis(shape):
     assert_allclose(np.abs(frames[[N // 4, 3 * N // 4], 1, 1]), np.ones(2), rtol=0, atol=1e-14)
 
 
-@PIECES
+@SECTORS_OF_RINGS
 def test_untwisted_ring_has_link_zero(shape, name):
     """Flat, d1 = E1 all around; and gamma on one grip is undone by -gamma on the other."""
-    piece, state = twisted(shape, name, 0.6)
-    assert piece.link(piece.start) == 0
-    assert piece.link(state) == 0
+    ring, state = twisted(shape, name, 0.6)
+    assert ring.link(ring.start) == 0
+    assert ring.link(state) == 0

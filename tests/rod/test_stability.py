@@ -12,10 +12,13 @@ import scipy.linalg
 from rods import dense, lifted, richardson
 
 import der
-from der.continuation.arclength import Tally, Visit, Wanted, follow
+from der.analysis.request import Request
 from der.kernels.assembly import assemble
-from der.rod.gripped_ring import Sector, sector
-from der.rod.stability import SymmetryClass, all_modes, index, softest_modes
+from der.problem import Point
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
+from der.rod.manifold import split
+from der.rod.stability import index
 
 FOLDS_AT_1 = (5.4590899018, 3.061520306)  # gamma, validation/reference/circ_ht1_beyond_pi.csv
 
@@ -32,18 +35,18 @@ def path(h_over_t: float, n_edges: int, shape: str = "auto") -> der.Path:
 
 
 @functools.cache
-def visits(h_over_t: float) -> tuple[Sector, tuple[Visit, ...]]:
-    """Sector and states of the same path, with 64 edges, for looking at single modes."""
-    piece = sector(der.circle(), der.rectangular_section(h_over_t), 64)
-    load_max = 6.0 if h_over_t == 1.0 else np.pi
-    wanted = Wanted(load_max=load_max, until_folded=h_over_t == 1.0, contacts=False)
-    return piece, tuple(follow(piece, wanted, Tally()))
+def points(h_over_t: float) -> tuple[GrippedRing, tuple[Point, ...]]:
+    """GrippedRing and states of the same path, with 64 edges, for looking at single modes."""
+    ring = gripped_ring(der.circle(), der.rectangular_section(h_over_t), 64)
+    gamma_max = 6.0 if h_over_t == 1.0 else np.pi
+    request = Request(gamma_max, until_folded=h_over_t == 1.0, self_crossings=False)
+    return ring, tuple(request.follow(ring))
 
 
-def of_kind(h_over_t: float, kind: str) -> tuple[Sector, list[Visit]]:
-    """Sector and special points of one kind."""
-    piece, found = visits(h_over_t)
-    return piece, [visit for visit in found if visit.kind == kind]
+def of_kind(h_over_t: float, kind: str) -> tuple[GrippedRing, list[Point]]:
+    """GrippedRing and special points of one kind."""
+    ring, found = points(h_over_t)
+    return ring, [point for point in found if point.kind == kind]
 
 
 def changes(found: der.Path) -> list[tuple[str, int, int]]:
@@ -55,21 +58,20 @@ def changes(found: der.Path) -> list[tuple[str, int, int]]:
     ]
 
 
-def load_rate(piece: Sector, modes: SymmetryClass, visit: Visit, w: np.ndarray) -> float:
+def load_rate(ring: GrippedRing, symmetry: str, at: Equilibrium, w: np.ndarray) -> float:
     """w . d(grad)/dgamma, of the Lagrangian, for a mode ``w`` (n, b) without stiffness.
 
     The forces y that belong to it complete the null vector: H w + B y = 0. Then
     (w, y) . (d(grad)/dgamma, d(gap)/dgamma) is what decides whether gamma can pass.
     """
-    state = visit.at.state
-    system = assemble(piece.body, piece.held, state.quat, state.stretch, state.force, state.load)
+    state, free = at.state, ring.modes[symmetry].free
+    system = assemble(ring.rod, ring.supports, state.quat, state.stretch, state.force, state.load)
     pushed = np.zeros_like(w)
     for j in range(len(w)):
         pushed[j] += system.diag[j] @ w[j]
-    for s in range(len(piece.body.cell)):
+    for s in range(len(ring.rod.cell)):
         pushed[s] += system.off[s] @ w[s + 1]
         pushed[s + 1] += system.off[s].T @ w[s]
-    free = modes.free
     y, *_ = np.linalg.lstsq(system.border[free], -pushed[free], rcond=None)
     return float(np.sum(w[free] * system.load_column[free]) + y @ system.load_border)
 
@@ -165,18 +167,18 @@ def test_softest_modes_are_eigenvectors():
 
     LAPACK on the conditions' null space; measured 1e-11 of eigenvalues of order 1.
     """
-    piece, found = visits(4.0)
-    whole = sector(der.circle(), der.rectangular_section(4.0), 64, name="full")
-    at = lifted(piece, found[len(found) // 3].at.state, whole)
-    hess, border = dense(whole.body, whole.held, at.state)
-    mass = np.repeat(whole.body.length, 3)[whole.held.free.ravel()]
+    ring, found = points(4.0)
+    full = gripped_ring(der.circle(), der.rectangular_section(4.0), 64, name="full")
+    at = lifted(ring, found[len(found) // 3].solution.state, full)
+    hess, border = dense(full, at.state)
+    mass = np.repeat(full.rod.length, 3)[full.supports.free.ravel()]
     z = scipy.linalg.null_space(border.T)
     exact = scipy.linalg.eigh(z.T @ hess @ z, z.T @ (mass[:, None] * z), eigvals_only=True)
     exact = exact[np.argsort(np.abs(exact))][:2]
-    softest, modes = softest_modes(whole.body, whole.held, all_modes(whole.held), at.state, 2)
+    softest, modes = full.softest_modes(at.state, 2)
     assert softest == pytest.approx(exact, rel=1e-8)
     for mode in modes:
-        assert np.sum(whole.body.length[:, None] * mode**2) == pytest.approx(1.0, rel=1e-12)
+        assert np.sum(full.rod.length[:, None] * mode**2) == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("h_over_t", [1.6, 1.0])
@@ -186,15 +188,16 @@ def test_mode_that_vanishes_at_a_fold(h_over_t):
     Its stiffness is measured below 5e-14, from entries of the Hessian up to 1e3, and s is sought to
     1e-12; w . d(grad)/dgamma is 0.47 or more, not 0; and w is the path's tangent, to rounding.
     """
-    piece, folds = of_kind(h_over_t, "fold")
+    ring, folds = of_kind(h_over_t, "fold")
     assert len(folds) == 2
-    modes = piece.classes["in phase"][1]
     for fold in folds:
-        (stiffness,), (w,) = softest_modes(piece.body, piece.held, modes, fold.at.state)
+        at = fold.solution
+        (stiffness,), (w,) = ring.softest_modes(at.state, symmetry="in phase")
         assert abs(stiffness) < 1e-10
-        assert abs(load_rate(piece, modes, fold, w)) > 0.15
-        mass = piece.body.length[:, None]
-        t = fold.at.tangent.q / np.sqrt(np.sum(mass * fold.at.tangent.q**2))
+        assert abs(load_rate(ring, "in phase", at, w)) > 0.15
+        mass = ring.rod.length[:, None]
+        q = split(ring.supports, at.tangent).q
+        t = q / np.sqrt(np.sum(mass * q**2))
         assert abs(np.sum(mass * t * w)) == pytest.approx(1.0, abs=1e-12)
 
 
@@ -204,15 +207,15 @@ def test_mode_that_vanishes_at_a_branch():
     Measured 5e-13. The in-phase modes keep theirs, 0.95 or more, and dgamma/ds is 0.46 or more, so
     this is no fold.
     """
-    piece, branches = of_kind(1.0, "branch")
+    ring, branches = of_kind(1.0, "branch")
     assert len(branches) == 3
     for branch in branches:
-        at = (piece.body, piece.held)
-        (odd,), _ = softest_modes(*at, piece.classes["odd"][1], branch.at.state)
-        (even,), _ = softest_modes(*at, piece.classes["in phase"][1], branch.at.state)
+        at = branch.solution
+        (odd,), _ = ring.softest_modes(at.state, symmetry="odd")
+        (even,), _ = ring.softest_modes(at.state, symmetry="in phase")
         assert abs(odd) < 1e-10
         assert abs(even) > 0.3
-        assert abs(branch.at.tangent.load) > 0.15
+        assert abs(at.parameter_rate) > 0.15
 
 
 def test_branch_is_a_pair_that_the_load_does_not_push():
@@ -222,14 +225,13 @@ def test_branch_is_a_pair_that_the_load_does_not_push():
     states solved anew, to residuals of 1e-10.
     """
     quarter, branches = of_kind(1.0, "branch")
-    half = sector(der.circle(), der.rectangular_section(1.0), 64, name="half")
+    half = gripped_ring(der.circle(), der.rectangular_section(1.0), 64, name="half")
     for branch in branches:
-        at = Visit(lifted(quarter, branch.at.state, half))
-        for label in ("in phase", "out of phase"):
-            modes = half.classes[label][1]
-            (stiffness,), (w,) = softest_modes(half.body, half.held, modes, at.at.state)
+        at = lifted(quarter, branch.solution.state, half)
+        for symmetry in ("in phase", "out of phase"):
+            (stiffness,), (w,) = half.softest_modes(at.state, symmetry=symmetry)
             assert abs(stiffness) < 1e-10
-            assert abs(load_rate(half, modes, at, w)) < 1e-10
+            assert abs(load_rate(half, symmetry, at, w)) < 1e-10
 
 
 def test_index_is_unknown_where_a_mode_vanishes():
@@ -237,10 +239,10 @@ def test_index_is_unknown_where_a_mode_vanishes():
 
     At the states next to it on the path it is known, and differs by one.
     """
-    piece, (fold, _) = of_kind(1.6, "fold")
-    modes = piece.classes["in phase"][1]
-    assert index(piece.body, piece.held, modes, fold.at.state) is None
-    _, found = visits(1.6)
-    k = next(k for k, visit in enumerate(found) if visit is fold)
+    ring, (fold, _) = of_kind(1.6, "fold")
+    modes = ring.modes["in phase"]
+    assert index(ring.rod, ring.supports, modes, fold.solution.state) is None
+    _, found = points(1.6)
+    k = next(k for k, point in enumerate(found) if point is fold)
     before, after = found[k - 1].index[0], found[k + 1].index[0]
     assert (before, after) == (0, 1)

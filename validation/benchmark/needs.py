@@ -18,11 +18,10 @@ import numpy as np
 
 import der
 from der.analysis.landscape.actuators import struts
-from der.analysis.landscape.landscape import scene_sector
-from der.rod.equilibrium import equilibrium
+from der.analysis.request import ring_of
 from der.rod.free_ring import balance
-from der.rod.planar_march import solved
 from der.rod.planar_ring import covered, planar_ring
+from der.rod.planar_system import solved
 from validation.benchmark.rings import BARE, circle
 from validation.benchmark.rows import Measured, Row, measured
 
@@ -113,8 +112,8 @@ def _planar(repeats: int, n: int) -> Row:
     flat = solved(mesh.rod(1), covered(mesh, 1), np.zeros(2))
     first = float(mesh.way() @ (mesh.length * np.sin(flat.phi)))
     lengths = np.linspace(first, 0.1 * first, 19)
-    ring = scene_sector(scene, "full")
-    strut = struts(balance(ring.body, ring.start.quat, ring.start.stretch), (0, n // 2))[-1]
+    ring = ring_of(scene, "full")
+    strut = struts(balance(ring.rod, ring.start.quat, ring.start.stretch), (0, n // 2))[-1]
 
     def in_plane() -> tuple[int, float]:
         phi, force, count = np.append(flat.phi, 0.5 * math.pi), np.zeros(4), 0
@@ -125,9 +124,9 @@ def _planar(repeats: int, n: int) -> Row:
         return count, at.moment
 
     def in_space() -> tuple[int, float]:
-        state, count, piece = strut.piece.start, 0, strut.piece
+        state, count = strut.start, 0
         for length in lengths:
-            at = equilibrium(piece.body, piece.held, state.but(load=strut.first - length))
+            at = strut.system.correct(state.but(load=strut.first - length))
             state, count = at.state, count + at.iterations + 1
         return count, -at.moment
 

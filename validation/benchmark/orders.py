@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from der.analysis.curve_distance import curve_error
-from der.analysis.matching import ENERGY, GAMMA, MOMENT, RATE, Family, romberg
-from der.continuation.arclength import follow
-from der.continuation.events import Visit, Wanted
-from der.continuation.step import Tally
+from der.analysis.extrapolated_curve import ENERGY, GAMMA, MOMENT, RATE, Family
+from der.analysis.request import Request, ring_of
+from der.continuation.richardson import romberg
 from der.kernels.quaternions import Array
-from der.rod.gripped_ring import sector
+from der.problem import Point
+from der.rod.equilibrium import Equilibrium
 from der.scene import meshes, sector_name
 from validation.benchmark.rings import Known
 from validation.benchmark.rows import Row
@@ -42,21 +42,22 @@ def errors(truth: Known, n: int) -> Level:
     case = truth.case
     scene = case.scene(n_edges=n)
     name = sector_name(case.ring, "auto", n)
-    pieces = [sector(scene.ring, scene.section, k, name=name) for k in meshes(n, name)]
-    wanted = Wanted(stability=False, contacts=False)
-    visits = [v for v in follow(pieces[0], wanted, Tally()) if _is_compared(v)]
-    family = Family(tuple(pieces), scene.tolerance)
-    tables = [found.table for visit in visits if (found := family.matched(visit.at)) is not None]
-    if len(tables) < len(visits):  # a coarse mesh has no such state
+    rings = [ring_of(scene, name, k) for k in meshes(n, name)]
+    request = Request(stability=False, self_crossings=False)
+    points = [one for one in request.follow(rings[0]) if _is_compared(one)]
+    family = Family(tuple(rings), scene.tolerance)
+    matched = [family.matched(one.solution) for one in points]
+    tables = [found.table for found in matched if found is not None]
+    if len(tables) < len(points):  # a coarse mesh has no such state
         return Level(n, (math.nan, math.nan, math.nan))
     states = np.array([romberg(table)[:, :RATE] for table in tables])  # (n, 3 levels, 3)
     return Level(n, tuple(_distance(truth, states[:, level]) for level in range(len(NAMES))))
 
 
-def _is_compared(visit: Visit) -> bool:
+def _is_compared(one: Point[Equilibrium]) -> bool:
     """Folds, and states at the multiples of pi/PLACES."""
-    turns = visit.at.state.load * PLACES / math.pi
-    return visit.kind == "fold" or (visit.kind == "" and abs(turns - round(turns)) < 1e-12)
+    turns = one.solution.parameter * PLACES / math.pi
+    return one.kind == "fold" or (one.kind == "" and abs(turns - round(turns)) < 1e-12)
 
 
 def _distance(truth: Known, states: Array) -> float:

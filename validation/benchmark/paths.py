@@ -10,16 +10,17 @@ import numpy as np
 import der
 from der.analysis.loading import follow_angle
 from der.analysis.loading_by_relaxation import follow_relaxed
+from der.analysis.request import Request
 from der.analysis.snap import snap
-from der.continuation.events import Visit, Wanted
-from der.continuation.step import Tally
-from der.rod.gripped_ring import Sector, sector
+from der.problem import Point, Statistics
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 from validation.benchmark.extent import Extent
 from validation.benchmark.rings import RINGS, BenchRing, circle
 from validation.benchmark.rows import Row, cpu_time, path_row
 
-Follower = Callable[[Sector, Wanted, Tally], Iterator[Visit]]
-WANTED = Wanted(stability=False, contacts=False)
+Follower = Callable[[GrippedRing, Request, Statistics], Iterator[Point[Equilibrium]]]
+REQUEST = Request(stability=False, self_crossings=False)
 GOALS = {"circle, h/t 4": 10.0, "rectangle 0.6, r/a 0.3": 15.0, "triangle 90, r/a 1/30": 100.0}
 PATHS: tuple[tuple[str, der.Scene, float | None], ...] = (
     ("h/t 4, N 64, quarter, no stability", circle(4.0, stability=False), 15.0),
@@ -67,18 +68,20 @@ def bvp_paths(repeats: int, rings: tuple[BenchRing, ...] = RINGS) -> Iterator[Ro
 def relaxation(sizes: tuple[int, ...], repeats: int) -> Iterator[Row]:
     """The march of the angle by dynamic relaxation alone against the same by Newton, over N."""
     for n in sizes:
-        ring = sector(der.circle(), der.rectangular_section(4.0), n)
+        ring = gripped_ring(der.circle(), der.rectangular_section(4.0), n)
         for follow, words in ((follow_relaxed, ""), (follow_angle, " by Newton")):
 
-            def march(follow: Follower = follow, ring: Sector = ring) -> tuple[int, Tally]:
-                tally = Tally()
-                return len(list(follow(ring, WANTED, tally))), tally
+            def march(
+                follow: Follower = follow, ring: GrippedRing = ring
+            ) -> tuple[int, Statistics]:
+                statistics = Statistics()
+                return len(list(follow(ring, REQUEST, statistics))), statistics
 
-            states, tally = march()
+            states, statistics = march()
             milliseconds = 1e3 * cpu_time(march, repeats)
-            note = f"{tally.newton_iterations} Newton iterations, {milliseconds:.0f} ms"
+            note = f"{statistics.newton_iterations} Newton iterations, {milliseconds:.0f} ms"
             if follow is follow_relaxed:
-                note = f"{tally.force_evaluations} force evaluations, {milliseconds:.0f} ms"
+                note = f"{statistics.force_evaluations} force evaluations, {milliseconds:.0f} ms"
             case = f"h/t 4, N {n}, quarter, a state{words}"
             yield Row("relaxation", case, milliseconds / states, "ms", note=note)
 
@@ -86,9 +89,10 @@ def relaxation(sizes: tuple[int, ...], repeats: int) -> Iterator[Row]:
 def snaps(repeats: int) -> Iterator[Row]:
     """One snap: dynamic relaxation past the fold, and the polish by Newton."""
     for name in ("quarter", "full"):
-        ring = sector(der.circle(), der.rectangular_section(1.6), 64, name=name)
-        before = next(v.at for v in follow_angle(ring, WANTED, Tally()) if v.kind == "fold")
-        snapping = partial(snap, ring, WANTED, Tally(), before, before.tangent)
+        ring = gripped_ring(der.circle(), der.rectangular_section(1.6), 64, name=name)
+        marched = follow_angle(ring, REQUEST, Statistics())
+        before = next(one.solution for one in marched if one.kind == "fold")
+        snapping = partial(snap, ring, REQUEST, Statistics(), before, before.tangent)
         milliseconds = 1e3 * cpu_time(snapping, repeats)
         note = f"{snapping().details['force_evaluations']} force evaluations"
         yield Row("snap", f"h/t 1.6, N 64, {name}", milliseconds, "ms", 100.0, note)

@@ -10,8 +10,8 @@ import numpy as np
 import der
 from der.kernels.assembly import assemble, take_out
 from der.kernels.block_ldl import factor
-from der.rod.equilibrium import Control, Direction, Equilibrium, equilibrium, moved
-from der.rod.gripped_ring import Sector, sector
+from der.rod.equilibrium import Equilibrium
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.rod.rod import State
 from validation.benchmark.extent import Extent
 from validation.benchmark.rings import BARE, circle
@@ -66,19 +66,20 @@ def scale(n: int, repeats: int) -> Scale:
     return Scale(n, newton, residual, _bytes(ring), path.cpu, path.memory or 0, iterations)
 
 
-def _newton(n: int, repeats: int) -> tuple[float, float, Sector]:
+def _newton(n: int, repeats: int) -> tuple[float, float, GrippedRing]:
     """CPU time of one iteration of the full ring, the residual it ends with, and the ring.
 
     Timed as whole solves at a given gamma; the last pass of a solve, for tangent and index, costs
     an iteration, and so does its share of the call.
     """
-    ring = sector(der.circle(), der.rectangular_section(4.0), n, name="full")
-    flat = equilibrium(ring.body, ring.held, ring.start)
-    rate = flat.tangent
-    start = moved(ring.held, flat.state, Direction(0.1 * rate.q, 0.1 * rate.force, 0.1))
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), n, name="full")
+    flat = ring.correct(ring.start)
+    ahead = 0.1 * flat.tangent
+    ahead[-1] = 0.1
+    start = ring.retract(flat.state, ahead)
 
     def solve() -> Equilibrium:
-        return equilibrium(ring.body, ring.held, start, control=Control.LOAD)
+        return ring.correct(start)
 
     solved = solve()
     many = max(1, AS_A_BATCH // n)
@@ -86,12 +87,12 @@ def _newton(n: int, repeats: int) -> tuple[float, float, Sector]:
     return seconds / (many * (solved.iterations + 1)), solved.residual, ring
 
 
-def _bytes(ring: Sector) -> int:
+def _bytes(ring: GrippedRing) -> int:
     """Bytes that one iteration holds at once: state, derivatives and factors."""
     state: State = ring.start
-    held = ring.held
-    system = assemble(ring.body, held, state.quat, state.stretch, state.force, state.load)
-    blocks = take_out(held.free, system.diag, system.off, system.border)
+    supports = ring.supports
+    system = assemble(ring.rod, supports, state.quat, state.stretch, state.force, state.load)
+    blocks = take_out(supports.free, system.diag, system.off, system.border)
     factors = factor(*blocks)
-    arrays = [*state, *held, *ring.body, *system, *blocks, *factors]
+    arrays = [*state, *supports, *ring.rod, *system, *blocks, *factors]
     return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import der
-import der.continuation.arclength
+from der.analysis import fold as folding
+from der.analysis.request import Request
 from der.bvp.solve import solve_bvp
 from der.errors import NotConverged
 from der.geometry.section import Scale
@@ -20,7 +21,7 @@ from der.kernels.assembly import assemble
 from der.kernels.linking import link
 from der.records.configurations import Shapes
 from der.records.path import Path
-from der.rod.gripped_ring import sector
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.scene import CROSSINGS_UP_TO, Scene
 from der.utils.checks import Array
 from validation.stress.cases import KINDS, scene_of
@@ -135,7 +136,7 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
     Its frames are taken from the record; the internal forces, which are not in it, are fitted. So
     residual, energy and moment are computed anew, and Tw + Wr.
     """
-    ring = sector(
+    ring = gripped_ring(
         scene.ring,
         scene.section,
         scene.n_edges,
@@ -144,9 +145,9 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
         stretching=scene.stretching,
     )
     raw = path.raw or {}
-    body = ring.body
+    rod = ring.rod
     # arc lengths are rounded, and so are cells, which are their differences
-    rounding = 1e-15 * scene.ring.length * float(body.stiffness.max() / body.cell.min() ** 2)
+    rounding = 1e-15 * scene.ring.length * float(rod.stiffness.max() / rod.cell.min() ** 2)
     columns = [np.asarray(raw.get(name, getattr(path, name))) for name in _COLUMNS]
     scales = [max(float(np.abs(column).max(initial=0.0)), 1e-3) for column in columns]
     tolerance = max(scene.tolerance, 1e-8 if scene.solver == "relaxation" else 0.0)
@@ -158,7 +159,7 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
         quat = _quaternions(shapes.frames[k])
         edge = shapes.x[k] - np.roll(shapes.x[k], 1, axis=0)
         length = np.sum(edge * shapes.frames[k, :, 2], axis=1)
-        stretch = length / ring.body.length - 1.0 if scene.stretching else np.zeros(len(quat))
+        stretch = length / rod.length - 1.0 if scene.stretching else np.zeros(len(quat))
         residual, noise, found_energy, found_moment = _residual(ring, quat, stretch, float(gamma))
         allowed = 20.0 * max(tolerance, 10.0 * noise) + 1e-14 * scene.stretching + rounding
         flat = gamma != 0.0 and float(np.ptp(shapes.x[k, :, 0])) < 1e-3
@@ -186,21 +187,21 @@ def _quaternions(frames: Array) -> Array:
 
 
 def _residual(
-    ring: Any, quat: Array, stretch: Array, gamma: float
+    ring: GrippedRing, quat: Array, stretch: Array, gamma: float
 ) -> tuple[float, float, float, float]:
     """Residual, its rounding error, energy and M of a state of the full ring."""
-    held = ring.held
-    force = np.zeros(len(held.target))
-    system = assemble(ring.body, held, quat, stretch, force, gamma)
-    free = held.free.reshape(-1)
+    supports = ring.supports
+    force = np.zeros(len(supports.target))
+    system = assemble(ring.rod, supports, quat, stretch, force, gamma)
+    free = supports.free.reshape(-1)
     gradient = system.grad.reshape(-1)[free]
     border = system.border.reshape(-1, len(force))[free]
     force = -np.linalg.lstsq(border, gradient, rcond=None)[0]
-    system = assemble(ring.body, held, quat, stretch, force, gamma)
+    system = assemble(ring.rod, supports, quat, stretch, force, gamma)
     residual = max(
         float(np.abs(system.grad.reshape(-1)[free]).max()), float(np.abs(system.gap).max())
     )
-    return residual, system.noise, system.energy, ring.moment(system.load_grad)
+    return residual, system.noise, system.energy, ring.arm_moment(system.load_grad)
 
 
 # --- The other kinds -------------------------------------------------------------------------
@@ -262,12 +263,18 @@ def _steps(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 @contextmanager
 def _stepping(first: float, longest: float) -> Iterator[None]:
     """Other lengths of steps along a path than the follower's own."""
-    usual = der.continuation.arclength.FIRST_STEP, der.continuation.arclength.LARGEST_STEP
-    der.continuation.arclength.FIRST_STEP, der.continuation.arclength.LARGEST_STEP = first, longest
+    usual = folding._request
+
+    def request(scene: Scene) -> Request:
+        asked = usual(scene)
+        options = replace(asked.options, first_step=first, largest_step=longest)
+        return replace(asked, options=options)
+
+    folding._request = request
     try:
         yield
     finally:
-        der.continuation.arclength.FIRST_STEP, der.continuation.arclength.LARGEST_STEP = usual
+        folding._request = usual
 
 
 def _again(parameters: Mapping[str, Any]) -> Iterator[Fault]:

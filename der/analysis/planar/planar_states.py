@@ -43,7 +43,7 @@ _TURNS = 3
 _EDGES_A_TURN = 8  # at least
 _IMPERFECTION = 1.0  # rad, of one wave on the ring, on the way to it
 # other branches may lie close by: steps no longer than these
-_OPTIONS = Options(first_step=0.02, largest_step=0.08, sharpest_turn=0.45)
+_OPTIONS = Options(first_step=0.02, largest_step=0.12, sharpest_turn=0.45)
 _ALIKE = 1e-7  # of the energies of two states that are one
 _COSTLESS = 1e-6  # of EI1 (2 pi/L)^2: stiffness of a motion that costs nothing
 

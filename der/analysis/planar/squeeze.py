@@ -39,7 +39,7 @@ from der.utils.run import Run
 
 _THERE = 1e-9  # of the distance: the flat ring is where it should go
 # the shape may have other branches close by: steps no longer than these
-_OPTIONS = Options(first_step=0.02, largest_step=0.08, sharpest_turn=0.45)
+_OPTIONS = Options(first_step=0.02, largest_step=0.12, sharpest_turn=0.45)
 _SAME = 0.3  # rad: a state on another mesh that is further away is another state
 
 
