@@ -160,39 +160,3 @@ def _pairs(rod: Path, bvp: Path) -> tuple[list[ComparedPoint], int]:
             bar = None if errors is None else errors["gamma"] + solved["gamma"][b.position]
             pairs.append((a.position, ComparedPoint(kind, a.gamma, b.gamma, bar)))
     return [pair for _, pair in sorted(pairs, key=lambda one: one[0])], alone
-
-
-def table(comparison: Comparison) -> str:
-    """The differences in a few lines of text, for the terminal."""
-    rows = [f"{'':8}{'gamma':>12}{'M rod':>14}{'M bvp':>14}{'distance':>11}{'bar':>10}"]
-    asked = _asked(comparison)
-    for state in comparison.states:
-        if not state.kind and state.gamma not in asked:
-            continue
-        bar = "" if state.moment_bar is None else f"{state.moment_bar:10.1e}"
-        verdict = {True: "", False: "  beyond", None: ""}[state.agrees]
-        rows.append(
-            f"{state.kind:8}{state.gamma:12.8f}{state.rod_moment:14.9f}{state.bvp_moment:14.9f}"
-            f"{state.moment_distance:11.1e}{bar}{verdict}"
-        )
-    for pair in comparison.pairs:
-        bar = "" if pair.bar is None else f", bar {pair.bar:.1e}"
-        rows.append(
-            f"{pair.kind:8}{pair.rod_gamma:12.8f}{'':14}{pair.bvp_gamma:12.8f} by bvp: "
-            f"{pair.difference:.1e} rad apart{bar}"
-        )
-    moment, energy = comparison.largest
-    rows.append(f"largest normal distance: {moment:.1e} in M, {energy:.1e} in U (scaled planes)")
-    if not math.isnan(comparison.within):
-        rows.append(f"{100 * comparison.within:.1f} % of the states agree within their error bars")
-    if comparison.unmatched:
-        rows.append(f"{comparison.unmatched} states or special points have no counterpart")
-    return "\n".join(rows)
-
-
-def _asked(comparison: Comparison) -> set[float]:
-    """Gammas that the user asked for, or the multiples of pi/8."""
-    listed = comparison.rod.numerics.get("save_at")
-    if isinstance(listed, list):
-        return {*listed, math.pi}
-    return {k * math.pi / 8.0 for k in range(-80, 81)}
