@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_bvp
+from shapes import scene
 
 import der
 import der.analysis.curve_distance
@@ -31,11 +32,6 @@ R = math.sqrt(0.5)
 
 
 # --- shorthands -------------------------------------------------------------------------------
-
-
-def scene(ring: der.Ring, h_over_t: float, nu: float = 0.3, **wants: Any) -> der.Scene:
-    """A ring of rectangular section."""
-    return der.Scene(ring, der.rectangular_section(h_over_t, nu), **wants)
 
 
 def system(ring: der.Ring, h_over_t: float, nu: float = 0.3, **wants: Any) -> Collocation:

@@ -9,7 +9,6 @@ import os
 import random
 import signal
 import time
-from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 from der.diagram.cases import LABELS, Row
@@ -19,24 +18,6 @@ NOTES = "RING_ORIGAMI_NOTES"  # as in validation.stress.kill_and_resume, whose i
 TOY = replace(family("fig3a", finest=16), coarse=4)
 CUBE = replace(family("fig8a", finest=4), coarse=4)
 POISON = TOY.case("x", (0.5, 0.5))
-
-
-class Here(Executor):
-    """An executor that does its tasks at once, for scans whose workers are of no interest."""
-
-    width = 2
-
-    def __init__(self):
-        self.executor = self
-
-    def submit(self, function, *given):
-        """Do a task."""
-        done = Future()
-        done.set_result(function(*given))
-        return done
-
-    def stop(self):
-        """There is nothing to stop."""
 
 
 def toy(case):

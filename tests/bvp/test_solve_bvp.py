@@ -5,7 +5,8 @@ import signal
 
 import numpy as np
 import pytest
-from boundary_value import path, scene
+from boundary_value import path
+from shapes import scene
 
 import der
 from der.bvp.record import Followed

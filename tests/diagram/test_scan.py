@@ -14,12 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from here import Here
 from toy_cases import (
     CUBE,
     NOTES,
     POISON,
     TOY,
-    Here,
     along_that_dies_once,
     along_with_poison,
     deadly,

@@ -9,8 +9,9 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
-from boundary_value import Row, as_printed, path, points, rows, scene, state_at, system
+from boundary_value import Row, as_printed, path, points, rows, state_at, system
 from scipy.optimize import brentq
+from shapes import scene
 
 import der
 from der.bvp.continuation import follow
