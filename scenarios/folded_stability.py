@@ -13,24 +13,21 @@ to none, which is to be trusted to about a tenth of its distance from the finer 
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path as File
 
 import numpy as np
 
 import der
 from der.analysis.request import Request
-from der.geometry.ring import Ring
 from der.kernels.assembly import assemble
 from der.problem import total_index
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, free_supports, gripped_ring
 from der.rod.rod import State
 from der.rod.system import RodSystem
-from validation.arguments import Arguments
+from scenarios.output import Arguments, write_table
 
 EDGES = 128
 FLATTEST, SLENDEREST = 0.8, 100.0  # h/t between which thresholds are sought
@@ -43,13 +40,13 @@ LARGEST_CIRCLE = 0.5 * math.tan(math.pi / 12)  # r/a at which a triangle of 120 
 class Folded:
     """A ring's planar three-covered state on one mesh, for a section with EI1/GJ = alpha."""
 
-    ring: Ring
+    ring: der.Ring
     n_edges: int
     alpha: float
     state: State  # of the ring's smallest sector
 
     @classmethod
-    def of(cls, ring: Ring, n_edges: int = EDGES, h_over_t: float = 4.0) -> Folded:
+    def of(cls, ring: der.Ring, n_edges: int = EDGES, h_over_t: float = 4.0) -> Folded:
         """The state that twisting reaches at ``h_over_t``; of a D2 ring the only one there is.
 
         Raises
@@ -125,7 +122,7 @@ class Folded:
         return free.softest_modes(state, count)[0].tolist()
 
 
-def _evenly_bent(ring: Ring, gripped: GrippedRing) -> State:
+def _evenly_bent(ring: der.Ring, gripped: GrippedRing) -> State:
     """A D2 ring's folded state: the curvature is the natural one and 4 pi/L (paper, Eq. B.1)."""
     s = gripped.arc_length
     angle = ring.natural_angle(s) - ring.natural_angle(s[-1])
@@ -174,7 +171,7 @@ JUDGES: dict[str, Callable[[Folded, float], bool]] = {
 }
 
 
-def thresholds(ring: Ring, n_edges: int = EDGES) -> dict[str, float | None]:
+def thresholds(ring: der.Ring, n_edges: int = EDGES) -> dict[str, float | None]:
     """Thresholds of h/t by name of the judge."""
     state = Folded.of(ring, n_edges)
     return {
@@ -190,7 +187,7 @@ def extrapolated(coarse: float | None, fine: float | None) -> float | None:
     return fine + (fine - coarse) / 3.0
 
 
-def rings(*, quick: bool = False) -> Iterator[tuple[str, float, Ring]]:
+def rings(*, quick: bool = False) -> Iterator[tuple[str, float, der.Ring]]:
     """Family, parameter and ring."""
     yield "circle", 1.0, der.circle()
     if quick:
@@ -212,21 +209,16 @@ def rings(*, quick: bool = False) -> Iterator[tuple[str, float, Ring]]:
 
 def main() -> None:
     """Print and write the table."""
-    parser = Arguments(__file__, __doc__)
-    parser.add_argument("--out", type=File, default=File("out/folded_stability"))
-    parser.add_argument("--quick", action="store_true", help="the circle alone")
-    asked = parser.parse_args()
-    asked.out.mkdir(parents=True, exist_ok=True)
-    with (asked.out / "thresholds.csv").open("w", newline="") as file:
-        table = csv.writer(file)
-        table.writerow(["family", "parameter", "n_edges", *JUDGES])
-        for family, parameter, ring in rings(quick=asked.quick):
-            coarse, fine = (thresholds(ring, n_edges) for n_edges in (EDGES // 2, EDGES))
-            limit = {name: extrapolated(coarse[name], fine[name]) for name in JUDGES}
-            for n_edges, found in ((EDGES // 2, coarse), (EDGES, fine), ("extrapolated", limit)):
-                table.writerow([family, f"{parameter:.6g}", n_edges, *found.values()])
-            words = ", ".join(f"{name} {_word(value)}" for name, value in limit.items())
-            print(f"{family} {parameter:.4g}: {words}", flush=True)
+    asked = Arguments(__file__, __doc__).parse(quick=False)
+    rows: list[list[object]] = []
+    for family, parameter, ring in rings(quick=asked.quick):
+        coarse, fine = (thresholds(ring, n_edges) for n_edges in (EDGES // 2, EDGES))
+        limit = {name: extrapolated(coarse[name], fine[name]) for name in JUDGES}
+        for n_edges, found in ((EDGES // 2, coarse), (EDGES, fine), ("extrapolated", limit)):
+            rows.append([family, f"{parameter:.6g}", n_edges, *found.values()])
+        words = ", ".join(f"{name} {_word(value)}" for name, value in limit.items())
+        print(f"{family} {parameter:.4g}: {words}", flush=True)
+    write_table(asked.out / "thresholds.csv", ["family", "parameter", "n_edges", *JUDGES], rows)
     print(f"written to {asked.out}")
 
 

@@ -13,30 +13,56 @@ prints a table and writes stops.csv to DIR (default: out/random_folds).
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import time
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path as File
 
 import numpy as np
 
 import der
-from der.geometry.ring import Ring
-from der.geometry.section import Section
-from der.records.path import Path
-from validation.arguments import Arguments
-from validation.stress.random_rings import LOOSE, random_rings, work_missing
+from der.analysis.work import work_missing
+from der.errors import Reason
+from scenarios.output import Arguments, write_table
 
 WAYS: dict[str, dict[str, object]] = {
     "arclength": {"control": "arclength"},
     "angle, up and down": {"control": "angle", "unload": True},
     "moment": {"control": "moment"},
 }
-ANSWERS = ("break the symmetry", "breaks the symmetry", "turned back")  # in a stop's sentence
+# what the ring does, and not that the solver has failed; "" until marches give their reason
+ANSWERS = (Reason.BREAKS_SYMMETRY.word, Reason.TURNED_BACK.word, "")
+LOOSE = 1e-3  # of U: what the work between states is known to by interpolation
 DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt
+
+
+def random_rings(count: int, seed: int) -> Iterator[tuple[der.Ring, der.Section]]:
+    """Rings and sections, uniform over the ranges of figures 2, 3, 5 and 8; circles in log h/t.
+
+    nu is uniform from 0 to 0.5, and its ends and 0.3 have their turns too.
+    """
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        shape = random.choice(["circle", "ellipse", "rectangle", "triangle"])
+        axis = str(random.choice(["x", "y"]))
+        nu = float(random.choice([0.0, 0.3, 0.5, random.uniform(0.0, 0.5)]))
+        h_over_t = float(random.uniform(1.0, 4.0))
+        if shape == "circle":
+            ring = der.circle()
+            h_over_t = float(np.exp(random.uniform(math.log(0.2), math.log(60.0))))
+        elif shape == "ellipse":
+            ring = der.ellipse(float(random.uniform(0.5, 1.0)), axis)
+            h_over_t = float(random.uniform(0.2, 4.0))
+        elif shape == "rectangle":
+            b = float(random.uniform(0.2, 1.0))
+            ring = der.rectangle(b, float(random.uniform(0.1, b)), axis)
+        else:
+            apex = math.radians(float(random.uniform(30.0, 120.0)))
+            inscribed = 0.5 * math.tan(math.pi / 4 - apex / 4)
+            ring = der.triangle(apex, float(random.uniform(0.033, inscribed)))
+        yield ring, der.rectangular_section(h_over_t, nu)
 
 
 @dataclass(frozen=True)
@@ -44,8 +70,8 @@ class Stop:
     """A path that did not end as it should."""
 
     way: str
-    ring: Ring
-    section: Section
+    ring: der.Ring
+    section: der.Section
     explained: bool
     message: str
 
@@ -84,9 +110,8 @@ def tried(count: int, seed: int, n_edges: int = 64) -> Tried:
             try:
                 path = der.fold(scene)
             except der.NotConverged as failure:
-                message = str(failure)
-                stops.append(Stop(way, ring, section, is_answer(message), message))
                 path = failure.path
+                stops.append(Stop(way, ring, section, path.reason in ANSWERS, path.message))
             else:
                 stops += [Stop(way, ring, section, False, m) for m in faults(scene, path)]
             seconds[way] += time.process_time() - started
@@ -96,12 +121,7 @@ def tried(count: int, seed: int, n_edges: int = 64) -> Tried:
     return Tried(count, tuple(stops), folded, snaps, seconds)
 
 
-def is_answer(message: str) -> bool:
-    """Whether a stop says what the ring does, and not that the solver has failed."""
-    return any(words in message for words in ANSWERS)
-
-
-def faults(scene: der.Scene, path: Path) -> list[str]:
+def faults(scene: der.Scene, path: der.Path) -> list[str]:
     """Sentences on what is wrong with a path that ended."""
     found = []
     end = 0.0 if scene.unload else math.pi
@@ -117,18 +137,10 @@ def faults(scene: der.Scene, path: Path) -> list[str]:
 
 def main() -> None:
     """Run and print."""
-    parser = Arguments(__file__, __doc__)
-    parser.add_argument("--count", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--edges", type=int, default=64)
-    parser.add_argument("--out", type=File, default=File("out/random_folds"))
-    asked = parser.parse_args()
+    asked = Arguments(__file__, __doc__).parse(count=500, seed=1, edges=64)
     found = tried(asked.count, asked.seed, asked.edges)
-    asked.out.mkdir(parents=True, exist_ok=True)
-    with (asked.out / "stops.csv").open("w", newline="") as file:
-        table = csv.writer(file)
-        table.writerow(["way", "explained", "ring", "alpha", "beta", "message"])
-        table.writerows(stop.row for stop in found.stops)
+    columns = ["way", "explained", "ring", "alpha", "beta", "message"]
+    write_table(asked.out / "stops.csv", columns, (stop.row for stop in found.stops))
     for stop in found.stops:
         print(*stop.row, sep=" | ")
     print(f"{'way':20s} {'rings':>6s} {'unexplained':>12s} {'answers':>12s} {'CPU s':>8s}")

@@ -17,19 +17,17 @@ writes survey.csv and survey.png to DIR (default: out/stability_beyond_symmetry)
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path as File
 
 import numpy as np
 
 import der
-from der.geometry.ring import Ring
-from der.records.path import NO_MOMENT, Path
+from der.records.path import NO_MOMENT
 from scenarios.folded_stability import LARGEST_CIRCLE
-from validation.arguments import Arguments
+from scenarios.output import Arguments, write_table
 
 EDGES = 64
 INSCRIBED_60 = math.sqrt(3) / 6  # r/a at which a triangle of 60 degrees is a circle
@@ -55,7 +53,7 @@ class Case:
 
     family: str
     parameter: float
-    ring: Ring
+    ring: der.Ring
     h_over_t: float
 
 
@@ -144,7 +142,7 @@ def planes() -> Iterator[Case]:
             yield Case("triangle r/a = 1/30, deg", degrees, _triangle(degrees, 1 / 30), h)
 
 
-def _triangle(degrees: float, r: float) -> Ring:
+def _triangle(degrees: float, r: float) -> der.Ring:
     return der.triangle(math.radians(degrees), r)
 
 
@@ -186,7 +184,7 @@ def judged(case: Case, n_edges: int = EDGES) -> Verdict:
     )
 
 
-def _folded(case: Case, n_edges: int, control: str) -> Path:
+def _folded(case: Case, n_edges: int, control: str) -> der.Path:
     """The path, as far as it goes."""
     section = der.rectangular_section(case.h_over_t)
     scene = der.Scene(case.ring, section, n_edges=n_edges, self_crossings=False, control=control)
@@ -196,14 +194,14 @@ def _folded(case: Case, n_edges: int, control: str) -> Path:
         return failure.path
 
 
-def _rests_unfolded(path: Path) -> bool:
+def _rests_unfolded(path: der.Path) -> bool:
     """Whether a ring without moment arrives at pi in another state than the three-covered one."""
     if path.at_pi is None or path.mode is None or path.mode.foldable:
         return False
     return abs(path.at_pi.moment) <= NO_MOMENT * float(np.abs(path.moment).max())
 
 
-def _largest_index(path: Path) -> int:
+def _largest_index(path: der.Path) -> int:
     """Largest index of a path's states and beyond its branch points."""
     beyond = [p.index_after or 0 for p in path.branches]
     return int(max([*path.index.compressed().tolist(), *beyond], default=0))
@@ -224,10 +222,8 @@ def survey(*, quick: bool = False, n_edges: int = EDGES) -> list[Verdict]:
 def write(verdicts: list[Verdict], folder: File) -> None:
     """Write the table and the picture."""
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "survey.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, [entry.name for entry in fields(Verdict)])
-        table.writeheader()
-        table.writerows(asdict(verdict) for verdict in verdicts)
+    columns = [entry.name for entry in fields(Verdict)]
+    write_table(folder / "survey.csv", columns, map(astuple, verdicts))
     draw(verdicts, folder / "survey.png")
 
 
@@ -261,11 +257,7 @@ def draw(verdicts: list[Verdict], file: File) -> None:
 
 def main() -> None:
     """Run, write, and print what is wrong."""
-    parser = Arguments(__file__, __doc__)
-    parser.add_argument("--out", type=File, default=File("out/stability_beyond_symmetry"))
-    parser.add_argument("--edges", type=int, default=EDGES)
-    parser.add_argument("--quick", action="store_true", help="an ellipse at four sections")
-    asked = parser.parse_args()
+    asked = Arguments(__file__, __doc__).parse(edges=EDGES, quick=False)
     verdicts = survey(quick=asked.quick, n_edges=asked.edges)
     write(verdicts, asked.out)
     for verdict in verdicts:

@@ -15,7 +15,6 @@ thresholds.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -26,7 +25,7 @@ import numpy as np
 import der
 from der.analysis.multistability.initial_guesses import covered
 from der.rod.gripped_ring import gripped_ring
-from scenarios.output import folder, usage
+from scenarios.output import folder, usage, write_table
 
 if __name__ == "__main__":
     usage(__file__, __doc__)
@@ -106,6 +105,7 @@ on_mesh = {
 
 def main() -> None:
     """Search over the natural curvature, draw, and say how far the thresholds are off."""
+    from der.viz.plots import style
     from scenarios.states_plot import figure_over_curvature
 
     place = folder("states_of_natural_curvature")
@@ -117,14 +117,12 @@ def main() -> None:
         if kappa0 in SHOWN:
             one.save(place / f"states_{kappa0:g}.json")
             one.plot(place / f"states_{kappa0:g}.png")
-    with (place / "states.csv").open("w", newline="") as file:
-        rows = csv.writer(file)
-        rows.writerow(["natural_curvature", "name", "energy", "index", "needs_cut"])
-        for kappa0, one in sweep:
-            rows.writerows([kappa0, s.name, s.energy, s.index, s.needs_cut] for s in one.states)
-    from der.viz.plots.style import save
-
-    save(figure_over_curvature(sweep, bar, exact), place / "states.png")
+    write_table(
+        place / "states.csv",
+        ["natural_curvature", "name", "energy", "index", "needs_cut"],
+        ([k, s.name, s.energy, s.index, s.needs_cut] for k, one in sweep for s in one.states),
+    )
+    style.save(figure_over_curvature(sweep, bar, exact), place / "states.png")
     for n in COVERS:
         for k, truth in enumerate(exact[n]):
             fine, coarse = on_mesh[64][n][k], on_mesh[32][n][k]

@@ -14,13 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_bvp
+from shapes import scene
 
 import der
 import der.analysis.curve_distance
 from der.bvp.collocation import Collocation, Solution, collocation
-from der.bvp.continuation import Tally, Visit, Wanted, follow
+from der.bvp.continuation import follow
+from der.bvp.events import Point, Wanted
 from der.bvp.meshes import moved_to
 from der.bvp.sectors import sector
+from der.bvp.step import Statistics
 
 Array = NDArray[np.float64]
 
@@ -29,11 +32,6 @@ R = math.sqrt(0.5)
 
 
 # --- shorthands -------------------------------------------------------------------------------
-
-
-def scene(ring: der.Ring, h_over_t: float, nu: float = 0.3, **wants: Any) -> der.Scene:
-    """A ring of rectangular section."""
-    return der.Scene(ring, der.rectangular_section(h_over_t, nu), **wants)
 
 
 def system(ring: der.Ring, h_over_t: float, nu: float = 0.3, **wants: Any) -> Collocation:
@@ -50,15 +48,15 @@ def path(
 
 
 @functools.cache
-def visits(equations: Collocation, gamma: float, tolerance: float = 1e-8) -> tuple[Visit, ...]:
+def points(equations: Collocation, gamma: float, tolerance: float = 1e-8) -> tuple[Point, ...]:
     """All that is met on the way to the first arrival at ``gamma``."""
     wanted = Wanted(gamma_max=gamma, targets=(), tolerance=tolerance)
-    return tuple(follow(equations, wanted, Tally()))
+    return tuple(follow(equations, wanted, Statistics()))
 
 
 def state_at(equations: Collocation, gamma: float, tolerance: float = 1e-8) -> Solution:
     """The state at the first arrival at ``gamma``."""
-    return visits(equations, gamma, tolerance)[-1].at
+    return points(equations, gamma, tolerance)[-1].solution
 
 
 class Row(NamedTuple):

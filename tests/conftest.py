@@ -1,8 +1,13 @@
 """What all tests share."""
 
+import os
 import signal
 
 import pytest
+
+# Matrices are small here, and two workers share two cores: threads of the linear algebra would only
+# wait for each other. This must be said before numpy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @pytest.fixture(autouse=True, scope="session")

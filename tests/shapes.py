@@ -1,10 +1,15 @@
-"""Rings that several tests use."""
+"""Rings and scenes that several tests use."""
 
 import math
 
 import numpy as np
 
 import der
+
+
+def scene(ring: der.Ring, h_over_t: float, nu: float = 0.3, **wants: object) -> der.Scene:
+    """Return a ring of rectangular section, and what is wanted of it."""
+    return der.Scene(ring, der.rectangular_section(h_over_t, nu), **wants)
 
 
 def egg() -> der.Ring:

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from der.bvp.continuation import Visit
-from der.bvp.solve import solve_visits
+from der.bvp.events import Point
+from der.bvp.solve import solve_with_points
 from der.records.comparison import ComparedPoint, ComparedState, Comparison
 from der.records.path import Path
 from der.scene import Scene
@@ -58,10 +58,10 @@ def compare(
         shapes=False,
         save_at=tuple(sorted({g for g in rod.gamma.tolist() if 0.0 <= g <= _last(scene)})),
     )
-    bvp, visits = solve_visits(wanted, tolerance=tolerance, progress=progress)
+    bvp, points = solve_with_points(wanted, tolerance=tolerance, progress=progress)
     scales = (float(np.abs(bvp.moment).max()), float(np.abs(bvp.energy).max()))
     kinds = {point.position: point.kind for point in rod.points}
-    regular = [visit for visit in visits if visit.kind != "fold"]
+    regular = [point for point in points if point.kind != "fold"]
     states = [
         found
         for k in range(len(rod))
@@ -81,25 +81,25 @@ def _state(
     rod: Path,
     k: int,
     kind: str,
-    visits: list[Visit],
+    points: list[Point],
     scales: tuple[float, float],
     tolerance: float,
 ) -> ComparedState | None:
     """State k of the rod beside the solution at its gamma that is nearest in M and U."""
     gamma, moment, energy = (float(getattr(rod, n)[k]) for n in ("gamma", "moment", "energy"))
 
-    def apart(visit: Visit) -> float:
-        at = visit.at
+    def apart(point: Point) -> float:
+        at = point.solution
         return math.hypot((at.moment - moment) / scales[0], (at.energy - energy) / scales[1])
 
-    here = [visit for visit in visits if abs(visit.at.gamma - gamma) < SAME]
+    here = [point for point in points if abs(point.solution.gamma - gamma) < SAME]
     if not here:
         return None
-    visit = min(here, key=apart)
-    at = visit.at
+    point = min(here, key=apart)
+    at = point.solution
     slopes = (at.slope, 4.0 * at.moment)
     errors = _errors(rod, k)
-    own = (visit.error.moment, visit.error.energy)
+    own = (point.error.moment, point.error.energy)
     distances: list[float] = []
     bars: list[float | None] = []
     for value, other, slope, scale, name, solved in zip(
@@ -118,7 +118,7 @@ def _state(
             bars.append(None)
             continue
         vertical = (errors[name] + solved) / scale
-        horizontal = (errors["gamma"] + visit.error.gamma) / math.pi
+        horizontal = (errors["gamma"] + point.error.gamma) / math.pi
         bars.append((vertical + abs(steep) * horizontal) / math.hypot(1.0, steep) + tolerance)
     if max(distances) > FAR:
         return None
@@ -160,39 +160,3 @@ def _pairs(rod: Path, bvp: Path) -> tuple[list[ComparedPoint], int]:
             bar = None if errors is None else errors["gamma"] + solved["gamma"][b.position]
             pairs.append((a.position, ComparedPoint(kind, a.gamma, b.gamma, bar)))
     return [pair for _, pair in sorted(pairs, key=lambda one: one[0])], alone
-
-
-def table(comparison: Comparison) -> str:
-    """The differences in a few lines of text, for the terminal."""
-    rows = [f"{'':8}{'gamma':>12}{'M rod':>14}{'M bvp':>14}{'distance':>11}{'bar':>10}"]
-    asked = _asked(comparison)
-    for state in comparison.states:
-        if not state.kind and state.gamma not in asked:
-            continue
-        bar = "" if state.moment_bar is None else f"{state.moment_bar:10.1e}"
-        verdict = {True: "", False: "  beyond", None: ""}[state.agrees]
-        rows.append(
-            f"{state.kind:8}{state.gamma:12.8f}{state.rod_moment:14.9f}{state.bvp_moment:14.9f}"
-            f"{state.moment_distance:11.1e}{bar}{verdict}"
-        )
-    for pair in comparison.pairs:
-        bar = "" if pair.bar is None else f", bar {pair.bar:.1e}"
-        rows.append(
-            f"{pair.kind:8}{pair.rod_gamma:12.8f}{'':14}{pair.bvp_gamma:12.8f} by bvp: "
-            f"{pair.difference:.1e} rad apart{bar}"
-        )
-    moment, energy = comparison.largest
-    rows.append(f"largest normal distance: {moment:.1e} in M, {energy:.1e} in U (scaled planes)")
-    if not math.isnan(comparison.within):
-        rows.append(f"{100 * comparison.within:.1f} % of the states agree within their error bars")
-    if comparison.unmatched:
-        rows.append(f"{comparison.unmatched} states or special points have no counterpart")
-    return "\n".join(rows)
-
-
-def _asked(comparison: Comparison) -> set[float]:
-    """Gammas that the user asked for, or the multiples of pi/8."""
-    listed = comparison.rod.numerics.get("save_at")
-    if isinstance(listed, list):
-        return {*listed, math.pi}
-    return {k * math.pi / 8.0 for k in range(-80, 81)}

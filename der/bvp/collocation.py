@@ -11,21 +11,31 @@ from der.bvp.corrector import CONVERGED, DIVERGED, SINGULAR, SLOW, correct
 from der.bvp.gauss import Array, Rule, rule
 from der.bvp.meshes import Mesh, first_mesh, moved_to
 from der.bvp.sectors import Sector
+from der.errors import ContinuationFailed, Reason
 
-ADVICE = {
-    DIVERGED: "Newton's method diverges",
-    SLOW: "Newton's method does not converge",
-    SINGULAR: "the collocation equations are singular",
+REASONS = {
+    CONVERGED: Reason.CONVERGED,
+    DIVERGED: Reason.DIVERGED,
+    SLOW: Reason.TOO_MANY_ITERATIONS,
+    SINGULAR: Reason.SINGULAR,
 }
 CLOSE = 1e-9  # last increment; rates and places are those before it
 
 
 class Direction(NamedTuple):
-    """A change of a solution: of frames at the stages, constants p and gamma."""
+    """Unknowns of a solution, or a change of them: frames at the stages, constants p and gamma."""
 
     frames: Array  # (n, m, 4)
     p: Array  # (n_p,)
     gamma: float
+
+    def plus(self, share: float, other: Direction) -> Direction:
+        """These unknowns and a share of others."""
+        return Direction(
+            self.frames + share * other.frames,
+            self.p + share * other.p,
+            self.gamma + share * other.gamma,
+        )
 
 
 class Solution(NamedTuple):
@@ -45,6 +55,11 @@ class Solution(NamedTuple):
     iterations: int
 
     @property
+    def unknowns(self) -> Direction:
+        """What Newton's method solves for."""
+        return Direction(self.frames, self.p, self.gamma)
+
+    @property
     def slope(self) -> float:
         """dM/dgamma, from the linearised problem."""
         return self.moment_rate / self.tangent.gamma
@@ -53,13 +68,21 @@ class Solution(NamedTuple):
 class Failure(NamedTuple):
     """No solution, and why."""
 
-    outcome: int
+    reason: Reason
     iterations: int
 
-    @property
-    def reason(self) -> str:
-        """In words."""
-        return ADVICE[self.outcome]
+
+def required(found: Solution | Failure, message: str) -> Solution:
+    """Return what was found if it is a solution.
+
+    Raises
+    ------
+    ContinuationFailed
+        If it is none; ``message`` says where one was sought.
+    """
+    if isinstance(found, Failure):
+        raise ContinuationFailed(f"{message}: {found.reason.value}", found.reason)
+    return found
 
 
 class Error(NamedTuple):
@@ -111,7 +134,7 @@ class Collocation:
             tangent_p,
         )
         if status != CONVERGED and not (status == SLOW and tolerance == 0.0):
-            return Failure(status, done)
+            return Failure(REASONS[status], done)
         return Solution(
             mesh,
             frames,

@@ -69,7 +69,7 @@ _PATH = Kind(
     },
 )
 _COMPARISON = Kind(
-    _lazy("analysis.compare:table"),
+    _lazy("records.text:summary"),
     lambda comparison: "",
     lambda comparison, targets: "",
 )
@@ -79,12 +79,12 @@ _COMPARISON = Kind(
 
 def _text_of_landscape(found: Any) -> str:
     # what is not done says why on standard error
-    text: str = _lazy("records.landscape_text:words")(found, why=found.status == "done")
+    text: str = _lazy("records.text:summary")(found, why=found.status == "done")
     return text
 
 
 def _unfinished_landscape(found: Any, targets: Targets) -> str:
-    return f"{_lazy('records.landscape_text:reason')(found)}; what was found is {places(targets)}"
+    return f"{_lazy('records.text:reason')(found)}; what was found is {places(targets)}"
 
 
 def _play_landscape(found: Any, along: Callable[[], Any] | None, file: File) -> None:
@@ -112,15 +112,15 @@ def _unfinished_states(found: Any, targets: Targets) -> str:
     return f"{found.message}; states that were found: {len(found)}, {where}"
 
 
-def _states(text: str) -> Kind:
+def _states() -> Kind:
     return Kind(
-        _lazy(text),
+        _lazy("records.text:summary"),
         lambda found: "" if len(found) else "there is no state",
         _unfinished_states,
     )
 
 
-_PLANAR = _states("records.planar_text:words")
+_PLANAR = _states()
 
 KINDS = {  # by the name of the record's class
     "Path": _PATH,
@@ -137,7 +137,7 @@ KINDS = {  # by the name of the record's class
     "LeastPush": _landscape(
         lambda found: "" if found.best is not None else "there is no push that opens the ring",
     ),
-    "States": _states("records.states_text:words"),
+    "States": _states(),
     "PlanarStates": _PLANAR,
     "Squeeze": _PLANAR,
 }

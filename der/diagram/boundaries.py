@@ -24,7 +24,7 @@ import numpy as np
 
 from der.bvp.gauss import Array
 from der.diagram.cases import Case, Row, solve_case
-from der.diagram.conditions import KINDS, Lost, Value, fresh, numbers, on
+from der.diagram.conditions import KINDS, NotFound, Value, fresh, numbers, on
 from der.diagram.corners import FOLD, Line, Met, mark_corners
 from der.diagram.curve_pruning import (
     BESIDE,
@@ -41,6 +41,7 @@ from der.diagram.infinite_slope import across, infinite_slope_near, is_half
 from der.diagram.label_changes import Crossing, Placed, crossings_of, differences, seeds
 from der.diagram.polylines import distance, loose_ends, meetings
 from der.diagram.scanned_boundaries import BoundaryPoint, Corner, Curve
+from der.errors import ContinuationFailed
 from der.scene import Scene
 
 NARROW = 1e-3  # of the side: cases so near to each other have the state that a condition needs
@@ -255,7 +256,7 @@ class _Diagram:
                     near = corrected(condition, np.array(place), seed, near=REACH * crossing.gap)
                     if crossing.apart(near.u) < REACH * crossing.gap:
                         return trace(condition, near.u, near.state, states=self._states())
-                except Lost:
+                except ContinuationFailed:
                     continue
         return []
 
@@ -269,7 +270,7 @@ class _Diagram:
                 else:
                     found = condition(self._scene(u), seed)
             except ValueError as wrong:
-                raise Lost(str(wrong)) from wrong
+                raise NotFound(str(wrong)) from wrong
             return found.value, found
 
         return value
@@ -302,7 +303,7 @@ class _Diagram:
         try:
             fine = on(state.at.mesh.halved, state)
             change = self._condition(kind)(at.u, fine)[0] - state.value
-        except Lost:
+        except ContinuationFailed:
             return math.inf
         return self.height * (at.distance + abs(change) / float(np.linalg.norm(at.gradient)))
 
@@ -347,7 +348,7 @@ class _Diagram:
                 a, b = line.points[k + added : k + added + 2]
                 try:
                     at = corrected(self._condition(line.kind), 0.5 * (a.u + b.u), a.state)
-                except Lost:
+                except ContinuationFailed:
                     continue
                 added += 1
                 line.insert(k + added, at, None)

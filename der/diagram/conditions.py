@@ -20,12 +20,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from der.bvp.collocation import Collocation, Direction, Failure, Solution, collocation
+from der.bvp.collocation import Collocation, Direction, Solution, collocation, required
 from der.bvp.corrector import observe
 from der.bvp.gauss import Array
 from der.bvp.meshes import Mesh, fitted, mesh_at, moved_to
 from der.bvp.sectors import sector
 from der.diagram.branch_exchange import Centre, centre, hysteresis, shot
+from der.errors import ContinuationFailed, Reason
 from der.scene import Scene
 
 ACCURATE = 1e-9  # of gamma/pi and M: beyond, a mesh is fitted again
@@ -38,8 +39,11 @@ FARTHEST = 0.5  # of s: what lies farther is another state
 MOST = 20
 
 
-class Lost(RuntimeError):
-    """A condition that cannot be evaluated: its state has ceased to exist."""
+class NotFound(ContinuationFailed):
+    """A state, or a point of a curve, that a condition needs and that does not exist nearby."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, Reason.DIVERGED)
 
 
 class Value(NamedTuple):
@@ -62,17 +66,12 @@ def carried(scene: Scene, seed: Value) -> tuple[Collocation, Solution]:
 
     Raises
     ------
-    Lost
+    ContinuationFailed
         Where the rings have other segments, or no solution is near.
     """
     system, mesh = scaled(scene, seed)
     at = seed.at
-    found = system.solved(
-        mesh, Direction(at.frames, at.p, at.gamma), at.tangent, tolerance=TIGHT, iterations=15
-    )
-    if isinstance(found, Failure):
-        raise Lost(found.reason)
-    return system, found
+    return system, _solved(system, mesh, at.unknowns, at.tangent)
 
 
 def scaled(scene: Scene, seed: Value) -> tuple[Collocation, Mesh]:
@@ -80,13 +79,13 @@ def scaled(scene: Scene, seed: Value) -> tuple[Collocation, Mesh]:
 
     Raises
     ------
-    Lost
+    ContinuationFailed
         Where the rings have other segments.
     """
     system = collocation(sector(scene))
     old, new = seed.system.sector, system.sector
     if len(old.joints) != len(new.joints):
-        raise Lost(f"the ring has {len(new.joints) - 1} segments, not {len(old.joints) - 1}")
+        raise NotFound(f"the ring has {len(new.joints) - 1} segments, not {len(old.joints) - 1}")
     nodes = np.interp(seed.at.mesh.nodes, old.joints, new.joints)
     nodes[-1] = new.joints[-1]
     return system, mesh_at(new, system.rule, nodes)
@@ -97,15 +96,12 @@ def on(mesh: Mesh, seed: Value) -> Value:
 
     Raises
     ------
-    Lost
+    ContinuationFailed
         Where it cannot be solved for there.
     """
     system, at = seed.system, seed.at
     if seed.psi is None:
-        found = system.on(mesh, at)
-        if isinstance(found, Failure):
-            raise Lost(found.reason)
-        return seed._replace(at=found)
+        return seed._replace(at=required(system.on(mesh, at), "no solution on another mesh"))
     frames = moved_to(at.mesh, at.nodes[:-1], at.frames, mesh.stages)
     return _exchanged(system, mesh, frames, seed)
 
@@ -120,7 +116,7 @@ def fresh(seed: Value) -> Value:
         factor = min((size / (0.1 * ACCURATE)) ** 0.125, 2.0)
         n = math.ceil(factor * len(at.mesh.h))
         return on(fitted(at.mesh, at.nodes[:-1], at.frames, n), seed)
-    except Lost:
+    except ContinuationFailed:
         return seed
 
 
@@ -144,16 +140,8 @@ def numbers(state: Value) -> Array:
 def stability(scene: Scene, seed: Value) -> Value:
     """DM/ds at gamma = pi; the seed is a folded state."""
     system, near = carried(scene, seed)
-    found = system.solved(
-        near.mesh,
-        Direction(near.frames, near.p, math.pi),
-        near.tangent,
-        by_gamma=True,
-        tolerance=TIGHT,
-        iterations=15,
-    )
-    if isinstance(found, Failure):
-        raise Lost(found.reason)
+    guess = near.unknowns._replace(gamma=math.pi)
+    found = _solved(system, near.mesh, guess, near.tangent, by_gamma=True)
     return Value(found.moment_rate, found, system)
 
 
@@ -204,7 +192,7 @@ def snap_back(scene: Scene, seed: Value) -> Value:
 def _not_folded(at: Solution) -> None:
     """A fold or cusp that has merged with its mirror image has a condition of its own."""
     if abs(at.moment) < FOLDED and abs(at.gamma - math.pi) < FOLDED**3:
-        raise Lost("it has become the folded state")
+        raise NotFound("it has become the folded state")
 
 
 def exchange(scene: Scene, seed: Value) -> Value:
@@ -218,7 +206,7 @@ def _exchanged(system: Collocation, mesh: Mesh, frames: Array, seed: Value) -> V
     x = np.append(seed.at.p, seed.at.gamma)
     found = centre(system, mesh, frames, x, seed.psi, seed.bend)
     if found is None:
-        raise Lost("no two branches nearby")
+        raise NotFound("no two branches nearby")
     return Value(found.mu, _state(system, mesh, found), system, found.psi, bend=found.bend)
 
 
@@ -235,11 +223,11 @@ def asymptotic(state: Value) -> float:
     """Zero where an exchange touches a cusp, see `exchanges.hysteresis`."""
     at, psi = state.at, state.psi
     if psi is None:
-        raise Lost("not the state of an exchange")
+        raise NotFound("not the state of an exchange")
     try:
         return hysteresis(state.system, at.mesh, at.frames, np.append(at.p, at.gamma), psi)
     except ArithmeticError as problem:
-        raise Lost(str(problem)) from problem
+        raise NotFound(str(problem)) from problem
 
 
 def closeness(system: Collocation, at: Solution) -> tuple[float, Array]:
@@ -256,12 +244,15 @@ def closeness(system: Collocation, at: Solution) -> tuple[float, Array]:
 
 def _moved(system: Collocation, at: Solution, s: float) -> Solution:
     """The solution at a small distance along the path."""
-    t = at.tangent
-    guess = Direction(at.frames + s * t.frames, at.p + s * t.p, at.gamma + s * t.gamma)
-    found = system.solved(at.mesh, guess, t, tolerance=TIGHT, iterations=15)
-    if isinstance(found, Failure):
-        raise Lost(found.reason)
-    return found
+    return _solved(system, at.mesh, at.unknowns.plus(s, at.tangent), at.tangent)
+
+
+def _solved(
+    system: Collocation, mesh: Mesh, guess: Direction, along: Direction, *, by_gamma: bool = False
+) -> Solution:
+    """The solution beside a guess, to tight increments."""
+    found = system.solved(mesh, guess, along, by_gamma=by_gamma, tolerance=TIGHT, iterations=15)
+    return required(found, "no such state nearby")
 
 
 def _bend(system: Collocation, at: Solution) -> float:
@@ -284,7 +275,7 @@ def _root(system: Collocation, at: Solution, value: Callable[[Solution], float])
         if abs(step) < SMALL:
             return at
         step = max(-0.1, min(0.1, step))
-    raise Lost("no such state nearby on the path")
+    raise NotFound("no such state nearby on the path")
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,10 @@ from itertools import chain, combinations, product
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram.conditions import Lost, Value, asymptotic, on, steepening
+from der.diagram.conditions import NotFound, Value, asymptotic, on, steepening
 from der.diagram.curve_tracing import DIFFERENCE, EXACT, At, Function, corrected
 from der.diagram.polylines import meetings, nearest
+from der.errors import ContinuationFailed
 
 FOLD = "foldability"
 
@@ -110,7 +111,7 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
                     try:
                         met = _solved((kind, touched), u, (at.state,) * 2, condition, value)
                         break
-                    except Lost:
+                    except ContinuationFailed:
                         continue
                 if met is None:
                     continue
@@ -148,7 +149,7 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
         seeds = first.state, second.state
         try:
             met = _solved((one.kind, other.kind), u, seeds, condition)
-        except Lost:
+        except ContinuationFailed:
             continue
         if all(nearest(met.first.u, line.places)[1] < ASIDE for line in (one, other)):
             return met
@@ -168,7 +169,7 @@ def _led(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Ite
         try:
             for k in range(1, STEPS + 1):
                 at = corrected(condition, start + (u - start) * k / STEPS, at.state)
-        except Lost:
+        except ContinuationFailed:
             continue
         yield at
 
@@ -198,7 +199,7 @@ def _separate(line: Line, condition: Function[Value]) -> None:
             a, b = line.points[k], line.points[k + 1]
             try:
                 between = corrected(condition, 0.5 * (a.u + b.u), a.state)
-            except Lost:
+            except ContinuationFailed:
                 continue
             line.insert(k + 1, between, None)
 
@@ -209,7 +210,7 @@ def _touching(line: Line, value: Callable[[Value], float]) -> list[int]:
     for at in line.points:
         try:
             values.append(value(at.state))
-        except Lost:
+        except ContinuationFailed:
             values.append(math.nan)
     return [k for k in range(len(values) - 2, -1, -1) if values[k] * values[k + 1] < 0.0]
 
@@ -289,14 +290,14 @@ def _solved(
             break
         u = u + change
         if not np.linalg.norm(u - start) < NEAR:
-            raise Lost("no corner nearby")
+            raise NotFound("no corner nearby")
         before = values
         values, seeds = both(u, seeds)
         rates += np.outer(values - before - rates @ change, change) / size**2
     else:
-        raise Lost("no corner found")
+        raise NotFound("no corner found")
     if ((u < -EXACT) | (u > 1.0 + EXACT)).any():
-        raise Lost("the corner is outside")
+        raise NotFound("the corner is outside")
     u = np.clip(u, 0.0, 1.0)
     first, second = (At(u, seed, size, rate) for seed, rate in zip(seeds, rates, strict=True))
     one_fine, other_fine = (on(seed.at.mesh.halved, seed) for seed in seeds)

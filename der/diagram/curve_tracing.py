@@ -14,7 +14,8 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram.conditions import Lost
+from der.diagram.conditions import NotFound
+from der.errors import ContinuationFailed
 
 T = TypeVar("T")
 Function = Callable[[Array, T], tuple[float, T]]
@@ -44,7 +45,7 @@ def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> At[T]
 
     Raises
     ------
-    Lost
+    ContinuationFailed
         Where there is none within ``near``, or f cannot be evaluated.
     """
     start = u
@@ -53,19 +54,19 @@ def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> At[T]
     for _ in range(12):
         square = float(gradient @ gradient)
         if not square > 0.0:
-            raise Lost("the condition does not depend on the parameters")
+            raise NotFound("the condition does not depend on the parameters")
         change = -value * gradient / square
         size = float(np.linalg.norm(change))
         if size < EXACT:
             return At(u, state, size, gradient)
         if np.linalg.norm(u + change - start) > near:
-            raise Lost("no point of the curve nearby")
+            raise NotFound("no point of the curve nearby")
         before = value
         u = u + change
         value, state = f(u, state)
         # secant update along the way just gone (Broyden)
         gradient = gradient + (value - before - gradient @ change) / (size * size) * change
-    raise Lost("no point of the curve found")
+    raise NotFound("no point of the curve found")
 
 
 def _gradient(f: Function[T], u: Array, value: float, state: T) -> Array:
@@ -103,7 +104,7 @@ def trace(f: Function[T], u: Array, state: T, *, states: States[T] | None = None
 
     Raises
     ------
-    Lost
+    ContinuationFailed
         Where there is no point of the curve near ``u``.
     """
     states = states or States()
@@ -133,7 +134,7 @@ def _half(
             continue
         try:
             new = corrected(f, u, here.state, near=0.7 * step)
-        except Lost:
+        except ContinuationFailed:
             step *= 0.5
             continue
         way = np.array([-new.gradient[1], new.gradient[0]]) / np.linalg.norm(new.gradient)
@@ -167,7 +168,7 @@ def _smooth(f: Function[T], states: States[T], here: At[T], new: At[T]) -> bool:
         return True
     try:
         _, state = f(0.5 * (here.u + new.u), here.state)
-    except Lost:
+    except ContinuationFailed:
         return False
     return float(np.linalg.norm(states.numbers(state) - 0.5 * (a + b))) <= BENT * change
 
@@ -208,6 +209,6 @@ def _at_edge(f: Function[T], inside: At[T], outside: Array) -> At[T] | None:
             u, value = ahead, after
             if not abs(u[other] + h - start) <= farthest or _outside(u):
                 break
-    except Lost:
+    except ContinuationFailed:
         pass
     return None

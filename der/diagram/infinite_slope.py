@@ -20,10 +20,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from der.bvp.collocation import Direction, Failure
+from der.bvp.collocation import Direction, required
 from der.bvp.gauss import Array
 from der.diagram.branch_exchange import Shot, shot
-from der.diagram.conditions import Lost, Value, scaled
+from der.diagram.conditions import NotFound, Value, scaled
+from der.errors import ContinuationFailed
 from der.scene import Scene
 
 IN_PLANE, OUT_OF_PLANE = [0, 4], [1, 2, 3]  # of p = (m1, m2, m3, F1, F2), and of G
@@ -54,14 +55,14 @@ def infinite_slope_near(scene_at: SceneAt, u: Array, seed: Value) -> Value:
 
     Raises
     ------
-    Lost
+    ContinuationFailed
         Where there is none nearby.
     """
     if seed.way is not None:
         return _moved_onto(scene_at, u, seed, seed.way)
     try:
         return _moved_onto(scene_at, u, seed, WAYS[0])
-    except Lost:
+    except ContinuationFailed:
         return _moved_onto(scene_at, u, seed, WAYS[1])
 
 
@@ -102,19 +103,20 @@ def _moved_onto(scene_at: SceneAt, u: Array, seed: Value, way: Array) -> Value:
             break
         if size < CONVERGED:
             return _value(scene_at, u, seed, way, z)
-    raise Lost("no folded state of infinite slope nearby")
+    raise NotFound("no folded state of infinite slope nearby")
 
 
 def _value(scene_at: SceneAt, u: Array, seed: Value, way: Array, z: Array) -> Value:
     """The boundary's state, as a solution with its tangent."""
     place = u + z[2] * way
-    _, found = _left(scene_at, place, seed, z[:2])
+    _, folded = _left(scene_at, place, seed, z[:2])
     system, mesh = scaled(scene_at(place), seed)
     p = np.zeros_like(seed.at.p)
     p[IN_PLANE] = z[:2]
-    at = system.solved(mesh, Direction(found.frames, p, math.pi), seed.at.tangent, tolerance=LOOSE)
-    if isinstance(at, Failure):
-        raise Lost(at.reason)
+    found = system.solved(
+        mesh, Direction(folded.frames, p, math.pi), seed.at.tangent, tolerance=LOOSE
+    )
+    at = required(found, "no folded state of infinite slope nearby")
     return Value(-float(z[2]), at, system, way=way, place=place)
 
 
@@ -125,7 +127,7 @@ def _left(scene_at: SceneAt, place: Array, seed: Value, planar: Array) -> tuple[
     x[IN_PLANE] = planar
     found = shot(system, mesh, seed.at.frames, x)
     if not found.ok:
-        raise Lost("the folded ring cannot be shot")
+        raise NotFound("the folded ring cannot be shot")
     block = found.rates[np.ix_(OUT_OF_PLANE, OUT_OF_PLANE)]
     return np.append(found.missed[IN_PLANE], np.linalg.det(block)), found
 

@@ -13,7 +13,7 @@ import numpy as np
 from der.bvp.collocation import Collocation, Solution, collocation
 from der.bvp.gauss import Array
 from der.bvp.sectors import sector
-from der.bvp.solve import solve_visits
+from der.bvp.solve import solve_with_points
 from der.diagram.cases import Row
 from der.diagram.conditions import Value, closeness
 from der.errors import NotConverged
@@ -91,12 +91,12 @@ def seeds(kind: str, row: Row) -> Iterator[Value]:
         return
     scene = row.case.scene(save_at=())
     try:
-        _, visits = solve_visits(scene, tolerance=SEED)
+        _, points = solve_with_points(scene, tolerance=SEED)
     except NotConverged:
         return
     system = collocation(sector(scene))
-    states = [visit.at for visit in visits]
-    folds = [visit.at for visit in visits if visit.kind == "fold"]
+    states = [point.solution for point in points]
+    folds = [point.solution for point in points if point.kind == "fold"]
     if kind in ("stability", "infinite slope"):
         chosen = states[-1:]
     elif kind == "foldability":

@@ -80,22 +80,9 @@ def bar(
     thick : factor on height and thickness
     """
     n = len(x)
-    tangent = np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0)
     edges = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)  # each to the next vertex
     length = float(edges.sum())
-    d2 = np.cross(tangent, d1)
-    d2 /= np.linalg.norm(d2, axis=1, keepdims=True)
-    height = thick * HEIGHT * length * math.sqrt(h_over_t / 4)
-    up, out = height / 2 * d1, height / h_over_t / 2 * d2
-    lines = np.array([x + up + out, x + up - out, x - up - out, x - up + out])  # (4, N, 3)
-    after = np.roll(lines, -1, axis=1)
-    beside = np.roll(lines, -1, axis=0)
-    corners = np.stack([lines, after, np.roll(after, -1, axis=0), beside], axis=2)  # (4, N, 4, 3)
-    normal = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 3] - corners[:, :, 1])
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    outward = corners.mean(axis=2) - (x + np.roll(x, -1, axis=0)) / 2
-    normal *= np.sign(np.einsum("fnk,fnk->fn", normal, outward))[..., None]
-
+    corners, normal = _faces(x, d1, thick * HEIGHT * length * math.sqrt(h_over_t / 4), h_over_t)
     if colour is None:
         # faces in turn: +d1, -d2, -d1, +d2
         base = np.repeat(np.array([EDGE, INSIDE, EDGE, OUTSIDE])[:, None], n, axis=1)
@@ -119,3 +106,20 @@ def bar(
         shaded[order],
         np.array([grips[0] - along, grips[1] + along]) @ on_screen,
     )
+
+
+def _faces(x: Array, d1: Array, height: float, h_over_t: float) -> tuple[Array, Array]:
+    """Corners (4, N, 4, 3) of a bar's faces, four around every edge, and their normals."""
+    tangent = np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0)
+    d2 = np.cross(tangent, d1)
+    d2 /= np.linalg.norm(d2, axis=1, keepdims=True)
+    up, out = height / 2 * d1, height / h_over_t / 2 * d2
+    lines = np.array([x + up + out, x + up - out, x - up - out, x - up + out])  # (4, N, 3)
+    after = np.roll(lines, -1, axis=1)
+    beside = np.roll(lines, -1, axis=0)
+    corners = np.stack([lines, after, np.roll(after, -1, axis=0), beside], axis=2)
+    normal = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 3] - corners[:, :, 1])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    outward = corners.mean(axis=2) - (x + np.roll(x, -1, axis=0)) / 2
+    normal *= np.sign(np.einsum("fnk,fnk->fn", normal, outward))[..., None]
+    return corners, normal

@@ -14,21 +14,21 @@ from der.paper.cases import (
     Case,
     Curve,
     at_vertices,
-    curve_of,
     smooth,
-    write_curves,
+    solved,
     write_shapes,
 )
 from der.paper.snapshots import LEVEL
 from der.utils.files import FilePath
+from der.viz.plots import style
 
-NUMERALS = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII")
+NUMERALS = "ⅠⅡⅢⅣⅤⅥⅦⅧ"
 
 
 def figc1(folder: FilePath) -> list[File]:
     """Circle, h/t = 1: moment and snapshots up to the three-covered ring."""
     case = Case("$h/t$ = 1", circle(), 1.0)
-    curve = curve_of(case, case.solve(shapes=True, until="folded"))
+    (curve,) = solved([case], shapes=True, until="folded")
     chosen = _spread(curve)
     figure = canvas.page(10.0, 5.6)
     panel = figure.add_axes((0.065, 0.375, 0.92, 0.565))
@@ -38,14 +38,13 @@ def figc1(folder: FilePath) -> list[File]:
     canvas.words(
         panel,
         (0.5, 1.05),
-        "Circle, $h/t$ = 1: un-foldable at the first arrival at $\\pi$; twisted on, the path ends "
+        "Circle, $h/t$ = 1: not foldable at the first arrival at $\\pi$; twisted on, the path ends "
         "in the three-covered ring",
         transform=panel.transAxes,
         fontsize=10,
     )
     states = curve.states[chosen][:, :2]
-    panel.plot(*states.T, "o", color=canvas.INK, markersize=4.5, zorder=5, clip_on=False)
-    canvas.write_beside(panel, states, NUMERALS, smooth(curve)[:, :2])
+    style.place_letters(panel, NUMERALS, states, smooth(curve)[:, :2])
     canvas.legend_of_marks(figure, [curve], dot="state shown below")
 
     row = figure.add_axes((0.01, 0.055, 0.98, 0.25))
@@ -60,11 +59,11 @@ def figc1(folder: FilePath) -> list[File]:
         words = words.replace("= 0 $\\pi$", "= 0").replace("= 1 $\\pi$", "= $\\pi$")
         canvas.words(row, (x, -0.72 * tall), words, fontsize=8.5)
     canvas.bare(row, (0.0, -0.85 * tall), (widths.sum(), 0.55 * tall))
-    about = "figC1: circle, h/t = 1, beyond pi until folded (a = R)"
+    about = "circle, h/t = 1, beyond pi until folded (a = R)"
+    shots = [(curve, k) for k in chosen]
     return [
-        canvas.save(figure, File(folder) / "figC1.png"),
-        write_curves(File(folder) / "figC1.csv", about, [curve]),
-        write_shapes(File(folder) / "figC1_shapes.csv", about, [(curve, k) for k in chosen]),
+        *canvas.written(folder, "figC1", figure, about, [curve]),
+        write_shapes(File(folder) / "figC1_shapes.csv", f"figC1: {about}", shots),
     ]
 
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,9 +157,9 @@ def curve_of(case: Case, path: Path) -> Curve:
     )
 
 
-def solved(cases: Iterable[Case]) -> list[Curve]:
-    """The curves of the cases, with states enough to be drawn."""
-    return [curve_of(case, case.solve()) for case in cases]
+def solved(cases: Iterable[Case], **options: Any) -> list[Curve]:
+    """The curves of the cases, with states enough to be drawn; options are those of `solve`."""
+    return [curve_of(case, case.solve(**options)) for case in cases]
 
 
 def smooth(curve: Curve) -> Array:
@@ -192,7 +192,7 @@ def in_words(mode: Mode | None) -> str:
     if mode is None:
         return "ends before $\\pi$"
     if not mode.foldable:
-        return "un-foldable"
+        return "not foldable"
     snapping = "no snap" if mode.snapping == "none" else mode.snapping
     return f"{'stable' if mode.stable else 'unstable'}, {snapping}"
 

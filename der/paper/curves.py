@@ -8,7 +8,7 @@ from pathlib import Path as File
 
 from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
 from der.paper import canvas
-from der.paper.cases import Case, Curve, in_words, plain, solved, write_curves
+from der.paper.cases import Case, Curve, in_words, plain, solved
 from der.utils.files import FilePath
 
 PLAIN = (1.0, 2.0, 3.0, 4.0)  # h/t
@@ -66,7 +66,7 @@ def figc2(folder: FilePath) -> list[File]:
     panel.set_ylim(bottom=0.0)
     canvas.legend(panel, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1)
     canvas.legend_of_marks(figure, curves, kinds=("fold",))
-    return _saved(folder, "figC2", figure, "figC2: energy of circles (a = R)", curves)
+    return canvas.written(folder, "figC2", figure, "energy of circles (a = R)", curves)
 
 
 def fig11(folder: FilePath) -> list[File]:
@@ -103,7 +103,7 @@ def fig11(folder: FilePath) -> list[File]:
         above.set_title(words, fontsize=9.5, color=canvas.INK, pad=20)
         _name_folds(above, below, curve)
     canvas.legend_of_marks(figure, curves)
-    return _saved(folder, "fig11", figure, "fig11: rounded triangles that snap back", curves)
+    return canvas.written(folder, "fig11", figure, "rounded triangles that snap back", curves)
 
 
 def _name_folds(above: canvas.Axes, below: canvas.Axes, curve: Curve) -> None:
@@ -144,15 +144,4 @@ def _side_by_side(folder: FilePath, name: str, words: str, cases: Sequence[Case]
         panel.set_title(words + about, fontsize=9.5, color=canvas.INK)
         canvas.legend(panel)
     canvas.legend_of_marks(figure, curves)
-    about = f"{name}: {plain(words)}"
-    return _saved(folder, name, figure, about, curves)
-
-
-def _saved(
-    folder: FilePath, name: str, figure: canvas.Figure, about: str, curves: Sequence[Curve]
-) -> list[File]:
-    """Write picture and table."""
-    return [
-        canvas.save(figure, File(folder) / f"{name}.png"),
-        write_curves(File(folder) / f"{name}.csv", about, curves),
-    ]
+    return canvas.written(folder, name, figure, plain(words), curves)

@@ -18,8 +18,8 @@ from pathlib import Path as File
 import numpy as np
 
 from der.analysis.fold import fold
+from der.analysis.work import work
 from der.geometry.section import rectangular_section
-from der.paper.cases import Array
 from der.paper.snapping_rings import SNAPPING
 from der.records.path import Path, Point
 from der.scene import Scene
@@ -27,7 +27,6 @@ from der.utils.files import FilePath, write_whole
 
 EDGES = 128
 LOADS = tuple(np.linspace(0.0, math.pi, 257))  # states at these, so that integrals are accurate
-_GAUSS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class Loop:
     def work(self) -> float:
         """Work done on the full ring, 4 times the loop integral of M dgamma, GJ/a."""
         gamma, moment = self.turned.gamma, self.turned.moment
-        return 4.0 * sum(_area(gamma[part], moment[part]) for part in self._smooth_parts())
+        return sum(float(work(gamma[part], moment[part])[-1]) for part in self._smooth_parts())
 
     def _smooth_parts(self) -> Iterator[slice]:
         """Parts of the path that are smooth: it is cut at each snap, and where unloading begins."""
@@ -82,19 +81,6 @@ class Loop:
     def landings(self) -> list[Landing]:
         """The end state of every snap, beside the state of the path that is nearest to it."""
         return [_landing(self, snap) for snap in self.snaps]
-
-
-def _area(gamma: Array, moment: Array) -> float:
-    """Integral of M dgamma along a smooth curve through states, a spline of its chord length."""
-    from scipy.interpolate import CubicSpline
-
-    scaled = np.column_stack([gamma / math.pi, moment / np.abs(moment).max()])
-    chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1)))
-    apart = np.append(True, np.diff(chord) > 1e-7)
-    s, spline = chord[apart], CubicSpline(chord[apart], np.column_stack([gamma, moment])[apart])
-    half = 0.5 * np.diff(s)[:, None]
-    at = s[:-1, None] + half * (1.0 + _GAUSS[0])
-    return float(np.sum(half * _GAUSS[1] * spline(at)[..., 1] * spline(at, 1)[..., 0]))
 
 
 def _landing(loop: Loop, snap: Point) -> Landing:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from der.paper import canvas
 from der.paper.cases import Array
@@ -43,15 +42,13 @@ def figure_of_loops(loops: list[Loop]) -> Figure:
             _zoom(axes[1], loop)
         axes[0].set_title(_title(loop), fontsize=8.5, color=canvas.INK)
         axes[0].tick_params(labelbottom=False)
-        axes[0].axhline(0.0, color=canvas.QUIET, linewidth=0.6, zorder=0)
+        style.zero_line(axes[0])
         axes[1].set_xlabel("$\\gamma/\\pi$", fontsize=9, color=canvas.INK)
     handles = [
-        Line2D([], [], color=colour, linestyle=dashes, linewidth=width, label=label)
+        style.entry(label, color=colour, linestyle=dashes, linewidth=width)
         for label, colour, dashes, width in LINES
     ]
-    style.legend_below(
-        figure, [*handles, Line2D([], [], label="end state of a snap", **STAR)], fontsize=8.5
-    )
+    style.legend_below(figure, [*handles, style.entry("end state of a snap", **STAR)], fontsize=8.5)
     return figure
 
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LightSource
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from der.geometry.ring import circle
 from der.paper import canvas
-from der.paper.cases import Array, Case, Curve, smooth, solved, write_curves
+from der.paper.cases import Array, Case, Curve, smooth, solved
 from der.utils.files import FilePath
-
-if TYPE_CHECKING:
-    from der.paper.canvas import Axes
 
 SHOWN = (1.0, 1.51, 1.6, 1.84, 2.0, 3.47, 4.0, 8.0)  # h/t
 # Here the first fold sits at pi: the path of a less flat section ends there, of a flatter one
@@ -37,15 +37,15 @@ def fig2b(folder: FilePath) -> list[File]:
     ]
     colours = canvas.sequence(len(curves))
     figure = canvas.page(10.0, 4.9)
-    _draw_manifold(canvas.page_3d(figure, (-0.02, 0.03, 0.51, 1.02)), sheets, curves, colours)
+    panel = Axes3D(figure, rect=(-0.02, 0.03, 0.51, 1.02), computed_zorder=False)
+    panel.patch.set_alpha(0.0)
+    figure.add_axes(panel)
+    _draw_manifold(panel, sheets, curves, colours)
     _draw_flat(figure.add_axes((0.585, 0.305, 0.40, 0.665)), curves, colours)
     canvas.legend_of_marks(figure, curves)
     table = [*curves, *sheets[0], *sheets[1]]
-    about = "fig2b: moment of circles (a = R); curves shown, and those that make the surface"
-    return [
-        canvas.save(figure, File(folder) / "fig2b.png"),
-        write_curves(File(folder) / "fig2b.csv", about, table),
-    ]
+    about = "moment of circles (a = R); curves shown, and those that make the surface"
+    return canvas.written(folder, "fig2b", figure, about, table)
 
 
 def _draw_manifold(
@@ -64,7 +64,7 @@ def _draw_manifold(
             color="#d9e4ef",
             alpha=0.6,
             linewidth=0,
-            lightsource=canvas.light(azimuth=300, elevation=45),
+            lightsource=LightSource(azdeg=300, altdeg=45),
             zorder=1,
         )
     for curve, colour in zip(curves, colours, strict=True):

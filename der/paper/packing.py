@@ -1,36 +1,30 @@
-"""The paper's figures of packing ratios, each as a picture and as a table of its numbers.
-
-matplotlib is imported inside functions only; figures are objects of their own, so that nothing
-global changes and no display is needed.
-"""
+"""The paper's figures of packing ratios, each as a picture and as a table of its numbers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from der.bvp.folded_shape import folded
 from der.bvp.packing import packing_ratio
 from der.geometry.ring import Ring, ellipse, rectangle, triangle
+from der.paper import canvas
+from der.paper.canvas import INK, QUIET
+from der.paper.cases import Array
 from der.utils.files import FilePath, write_whole
+from der.viz.plots import style
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
-
-DPI = 200
 MAP_POINTS = 720  # on a ring of a map: packing ratios to about 1e-7
 SHAPE_POINTS = 600
-INK, QUIET = "#222222", "#8a8a8a"
 FOLDED, FLAT = "#0072B2", "#bdbdbd"  # blue of Okabe and Ito
 LETTERS = "ABCDEFGH"
+DOT = style.mark("o", 4.5) | {"zorder": 4}
 # of contours of fig. 9: away from the jump
 LABELS = (
     (38, 0.28),
@@ -104,8 +98,7 @@ def fig6(folder: FilePath, columns: int = 49) -> list[Path]:
     marks = [_Mark((c, r), rectangle(c, r), f"{c:.2g}, {r:.2g}") for c, r in RECTANGLES]
     figure = _map_figure(b, r, ratio, marks, "$b/a,\\ r/a$")
     axes = figure.axes[0]
-    axes.set_xlabel("aspect ratio  $b/a$", fontsize=10, color=INK)
-    axes.set_ylabel("fillet radius  $r/a$", fontsize=10, color=INK)
+    style.label_axes(axes, "aspect ratio  $b/a$", "fillet radius  $r/a$", fontsize=10)
     axes.text(0.27, 0.72, "$r > b$: no such ring", fontsize=8.5, color=QUIET)
     columns_of = {"b_over_a": b, "r_over_a": r, "packing_ratio": ratio}
     return _written(folder, "fig6", figure, columns_of)
@@ -130,8 +123,8 @@ def fig9(folder: FilePath, columns: int = 22) -> list[Path]:
     ]
     figure = _map_figure(degrees, r, ratio, marks, "$\\alpha_T,\\ r/a$", LABELS)
     axes = figure.axes[0]
-    axes.set_xlabel("vertex angle  $\\alpha_T$  (degrees)", fontsize=10, color=INK)
-    axes.set_ylabel("fillet radius  $r/a$", fontsize=10, color=INK)
+    across = "vertex angle  $\\alpha_T$  (degrees)"
+    style.label_axes(axes, across, "fillet radius  $r/a$", fontsize=10)
     axes.set_xticks(range(30, 121, 15))
     axes.text(84, 0.29, "$r > R_C$: no such ring", fontsize=8.5, color=QUIET)
     columns_of = {"vertex_angle": degrees, "r_over_a": r, "packing_ratio": ratio}
@@ -161,46 +154,34 @@ def _grid(first: float, last: float, columns: object) -> tuple[Array, Array]:
 
 def _written(folder: FilePath, name: str, figure: Figure, table: dict[str, Array]) -> list[Path]:
     """Write the picture and its numbers."""
-    png, csv = Path(folder) / f"{name}.png", Path(folder) / f"{name}.csv"
+    csv = Path(folder) / f"{name}.csv"
     rows = np.column_stack([np.ravel(column) for column in table.values()])
     header = ",".join(table)
     write_whole(
         csv,
         lambda file: np.savetxt(file, rows, "%.10g", ",", header=header, comments=""),
     )
-    write_whole(png, lambda file: figure.savefig(file, format="png"))
-    return [png, csv]
+    return [canvas.save(figure, Path(folder) / f"{name}.png"), csv]
 
 
 # --- Pictures --------------------------------------------------------------------------------
 
 
-def _new_figure(width: float, height: float) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _curve_figure(b: Array, ratio: Array) -> Figure:
     """Packing ratio against b/a, below the folded shapes of some ellipses."""
-    figure = _new_figure(6.6, 4.6)
+    figure = canvas.page(6.6, 4.6)
     axes = figure.add_axes((0.11, 0.12, 0.86, 0.56))
     axes.plot(b, ratio, color=FOLDED, linewidth=1.8, zorder=2)
     axes.axhline(1 / 9, color=QUIET, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     axes.text(0.5, 1 / 9 + 0.004, "circle, 1/9", fontsize=8.5, color=QUIET, va="bottom")
     axes.set_xlim(0.46, 1.04)
     axes.set_ylim(0.08, 0.32)
-    axes.set_xlabel("aspect ratio  $b/a$", fontsize=10, color=INK)
-    axes.set_ylabel("packing ratio", fontsize=10, color=INK)
-    _plain(axes)
+    style.label_axes(axes, "aspect ratio  $b/a$", "packing ratio", fontsize=10)
     for c in ELLIPSES:
         ring = ellipse(c)
         height = packing_ratio(ring, MAP_POINTS)
         axes.vlines(c, height, 0.32, color=QUIET, linewidth=0.6, linestyle=(0, (1, 2)), zorder=1)
-        axes.plot(c, height, **_dot())
+        axes.plot(c, height, **DOT)
         centre = 0.11 + 0.86 * (c - 0.46) / 0.58
         inset = figure.add_axes((centre - 0.069, 0.72, 0.138, 0.2))
         _draw_shapes(inset, ring)
@@ -218,8 +199,28 @@ def _map_figure(
     labels_at: Sequence[tuple[float, float]] = (),
 ) -> Figure:
     """Contours of the packing ratio, beside the folded shapes of the rings that are marked."""
-    figure = _new_figure(9.2, 4.9)
+    figure = canvas.page(9.2, 4.9)
     axes = figure.add_axes((0.065, 0.115, 0.465, 0.835))
+    _contours(axes, x, y, ratio, labels_at)
+    for k, mark in enumerate(marks):
+        axes.plot(*mark.at, clip_on=False, **DOT)
+        # to the left of the last point of the map
+        away = (-7.5 if mark.at[0] == np.max(x) else 6.5, 6.5)
+        style.say(axes, mark.at, LETTERS[k], away, ha="center", fontsize=9, fontweight="bold")
+        left, bottom = 0.635 + 0.182 * (k % 2), 0.745 - 0.233 * (k // 2)
+        _draw_shapes(figure.add_axes((left, bottom, 0.175, 0.165)), mark.ring)
+        value = packing_ratio(mark.ring, MAP_POINTS)
+        caption = rf"$\bf{{{LETTERS[k]}}}$  {mark.label}:  {value:.2f}"
+        figure.text(left + 0.0875, bottom + 0.18, caption, ha="center", fontsize=8.5, color=INK)
+    about = figure.text(0.8135, 0.972, f"ring ({what}): packing ratio", color=QUIET, fontsize=8.5)
+    about.set(ha="center", va="center")
+    return figure
+
+
+def _contours(
+    axes: Axes, x: Array, y: Array, ratio: Array, labels_at: Sequence[tuple[float, float]]
+) -> None:
+    """Draw filled contours of the packing ratio, with a colour bar beside them."""
     highest = float(np.max(ratio))
     levels = np.append(np.arange(4, 12) / 40, np.arange(6, 20 * highest + 1) / 20)
     named = [
@@ -228,34 +229,14 @@ def _map_figure(
     filled = axes.contourf(x, y, ratio, levels=levels, cmap="viridis")
     lines = axes.contour(x, y, ratio, levels=levels[1:], colors="white", linewidths=0.5)
     axes.clabel(lines, named, fmt="%.3g", fontsize=7, manual=labels_at or False)
-    for values, limit in ((x, axes.set_xlim), (y, axes.set_ylim)):
-        low, high = float(np.min(values)), float(np.max(values))
-        limit(low - 0.04 * (high - low), high + 0.04 * (high - low))
-    _plain(axes)
+    axes.use_sticky_edges = False
+    axes.margins(0.04)
+    figure = axes.figure
     bar = figure.colorbar(filled, cax=figure.add_axes((0.545, 0.115, 0.014, 0.835)))
     bar.set_ticks([v for v in levels if round(40 * v) % 4 == 0])
     bar.set_label("packing ratio", fontsize=10, color=INK)
     bar.ax.tick_params(labelsize=8.5, labelcolor=INK, color=QUIET)
     bar.outline.set_visible(False)
-    for k, mark in enumerate(marks):
-        axes.plot(*mark.at, clip_on=False, **_dot())
-        _letter(axes, mark.at, LETTERS[k], is_last=mark.at[0] == np.max(x))
-        left, bottom = 0.635 + 0.182 * (k % 2), 0.745 - 0.233 * (k // 2)
-        inset = figure.add_axes((left, bottom, 0.175, 0.165))
-        _draw_shapes(inset, mark.ring)
-        value = packing_ratio(mark.ring, MAP_POINTS)
-        caption = rf"$\bf{{{LETTERS[k]}}}$  {mark.label}:  {value:.2f}"
-        figure.text(left + 0.0875, bottom + 0.18, caption, ha="center", fontsize=8.5, color=INK)
-    figure.text(
-        0.8135,
-        0.972,
-        f"ring ({what}): packing ratio",
-        ha="center",
-        va="center",
-        fontsize=8.5,
-        color=QUIET,
-    )
-    return figure
 
 
 def _draw_shapes(axes: Axes, ring: Ring) -> None:
@@ -269,40 +250,3 @@ def _draw_shapes(axes: Axes, ring: Ring) -> None:
         axes.plot(*(curve - middle).T, color=colour, linewidth=width)
     axes.set_aspect("equal")
     axes.set_axis_off()
-
-
-def _plain(axes: Axes) -> None:
-    axes.tick_params(labelsize=8.5, color=QUIET, labelcolor=INK, direction="in")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(QUIET)
-
-
-def _dot() -> dict[str, Any]:
-    return {
-        "marker": "o",
-        "markersize": 4.5,
-        "markerfacecolor": "white",
-        "markeredgecolor": INK,
-        "markeredgewidth": 0.9,
-        "linestyle": "none",
-        "zorder": 4,
-    }
-
-
-def _letter(axes: Axes, at: tuple[float, float], letter: str, *, is_last: bool) -> None:
-    """Write a letter beside a point, to its left where the point is the last of the map."""
-    from matplotlib.patheffects import withStroke
-
-    axes.annotate(
-        letter,
-        at,
-        xytext=(-7.5 if is_last else 6.5, 6.5),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=9,
-        fontweight="bold",
-        color=INK,
-        zorder=5,
-        path_effects=[withStroke(linewidth=2.2, foreground="white")],
-    )

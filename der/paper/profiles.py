@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path as File
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from der.geometry.ring import ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.bars import Camera, bar, camera
-from der.paper.cases import Case, Curve, at_vertices, curve_of, in_words, write_curves
+from der.paper.cases import Case, Curve, at_vertices, in_words, solved
 from der.utils.files import FilePath
 
 H_OVER_T = 4.0
@@ -100,7 +101,7 @@ def figd3(folder: FilePath) -> list[File]:
 
 def _profiles(folder: FilePath, name: str, panels: Sequence[Panel], about: str) -> list[File]:
     """Draw and write the panels side by side; the rings of one are in one scale."""
-    families = [[_solved(case) for case in panel.cases] for panel in panels]
+    families = [solved(panel.cases, shapes=True) for panel in panels]
     wide, high = 0.55 + 4.0 * len(panels), 5.35
     figure = canvas.page(wide, high)
     top = None
@@ -116,12 +117,9 @@ def _profiles(folder: FilePath, name: str, panels: Sequence[Panel], about: str) 
         above.set_title(panel.title, fontsize=9.5, color=canvas.INK)
         row = figure.add_axes((left - 0.2 / wide, 0.28 / high, ROW[0] / wide, ROW[1] / high))
         _draw_rings(row, curves, panel.view)
-    canvas.legend_of_marks(figure, [curve for curves in families for curve in curves])
     table = [curve for curves in families for curve in curves]
-    return [
-        canvas.save(figure, File(folder) / f"{name}.png"),
-        write_curves(File(folder) / f"{name}.csv", f"{name}: {about}", table),
-    ]
+    canvas.legend_of_marks(figure, table)
+    return canvas.written(folder, name, figure, about, table)
 
 
 def _draw_rings(row: canvas.Axes, curves: Sequence[Curve], view: Camera) -> None:
@@ -130,7 +128,7 @@ def _draw_rings(row: canvas.Axes, curves: Sequence[Curve], view: Camera) -> None
     for i, (curve, colour) in enumerate(zip(curves, canvas.COLOURS, strict=False)):
         before, after = (
             bar(*at_vertices(curve, k), 1.0, view, shade, THICK)
-            for k, shade in ((0, BEFORE), (-1, canvas.rgb(colour)))
+            for k, shade in ((0, BEFORE), (-1, to_rgb(colour)))
         )
         canvas.place(row, before, (i * slot, 0.0), zorder=1.0)
         canvas.place(row, after, (i * slot, 0.0), axis=False, zorder=3.0)
@@ -146,8 +144,3 @@ def _slot(curves: Sequence[Curve]) -> float:
     """Side of a square that holds any of the rings, flat or folded, with its twisting axis."""
     ends = [at_vertices(curve, k)[0] for curve in curves for k in (0, -1)]
     return 1.35 * max(float(np.ptp(x, axis=0)[1:].max()) for x in ends)
-
-
-def _solved(case: Case) -> Curve:
-    """The curve with its shapes."""
-    return curve_of(case, case.solve(shapes=True))

@@ -9,14 +9,14 @@ import numpy as np
 
 from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
 from der.paper import canvas
-from der.paper.bars import Camera, bar, camera
+from der.paper.bars import Camera, Picture, bar, camera
 from der.paper.cases import (
     Case,
     Curve,
     at_vertices,
-    curve_of,
     in_words,
     plain,
+    solved,
     write_shapes,
 )
 from der.utils.files import FilePath
@@ -25,6 +25,10 @@ EIGHTHS = (0, 2, 4, 5, 6, 7, 8)  # of pi: the snapshots; the ring moves most nea
 WIDTH = 10.0  # inches
 SECTIONS = (1.0, 4.0)  # h/t of the rows
 LEVEL = camera("level", azimuth=20.0, elevation=-42.0)
+NOTE = (
+    "Bars drawn thicker than they are, with the section's h/t; dark: grips; dashed: twisting "
+    "axis; strands pass through each other. Each state is the path's first at its $\\gamma$."
+)
 UPRIGHT = camera("upright", azimuth=38.0, elevation=22.0)
 
 
@@ -59,15 +63,24 @@ def fig10e(folder: FilePath) -> list[File]:
 
 def _rows(folder: FilePath, name: str, words: str, ring: Ring, view: Camera) -> list[File]:
     """Draw and write the snapshots of a ring, all in one scale."""
-    curves = [_snapshots(Case(f"$h/t$ = {h:g}", ring, h)) for h in SECTIONS]
+    cases = [Case(f"$h/t$ = {h:g}", ring, h) for h in SECTIONS]
+    curves = solved(cases, save_at=[math.pi * k / 8 for k in EIGHTHS], shapes=True)
     shots = [[curve.first(math.pi * k / 8) for k in EIGHTHS] for curve in curves]
     pictures = [
         [bar(*at_vertices(curve, k), curve.case.h_over_t, view) for k in row]
         for curve, row in zip(curves, shots, strict=True)
     ]
+    listed = [(curve, k) for curve, row in zip(curves, shots, strict=True) for k in row]
+    return [
+        canvas.save(_page(words, curves, pictures), File(folder) / f"{name}.png"),
+        write_shapes(File(folder) / f"{name}.csv", f"{name}: {plain(words)}", listed),
+    ]
+
+
+def _page(words: str, curves: list[Curve], pictures: list[list[Picture]]) -> canvas.Figure:
+    """The page: a row of pictures below the words of each curve."""
     sizes = np.array([[np.ptp(picture.box, axis=0) for picture in row] for row in pictures])
-    gap = 0.03 * ring.length
-    widths = sizes[:, :, 0].max(axis=0) + gap
+    widths = sizes[:, :, 0].max(axis=0) + 0.03 * curves[0].case.ring.length
     heights = sizes[:, :, 1].max(axis=1)
     middles = np.cumsum(widths) - widths / 2
     line = 0.024 * widths.sum()  # room for a line of words
@@ -88,20 +101,6 @@ def _rows(folder: FilePath, name: str, words: str, ring: Ring, view: Camera) -> 
             canvas.place(panel, picture, (x, top - height / 2))
         top -= height + 0.3 * line
     small = {"fontsize": 7.5, "color": canvas.QUIET}
-    note = (
-        "Bars drawn thicker than they are, with the section's h/t; dark: grips; dashed: twisting "
-        "axis; strands pass through each other. Each state is the path's first at its $\\gamma$."
-    )
-    canvas.words(panel, (widths.sum() / 2, low[1] + 0.9 * line), note, **small)
+    canvas.words(panel, (widths.sum() / 2, low[1] + 0.9 * line), NOTE, **small)
     canvas.bare(panel, low, high)
-    about = f"{name}: {plain(words)}"
-    listed = [(curve, k) for curve, row in zip(curves, shots, strict=True) for k in row]
-    return [
-        canvas.save(figure, File(folder) / f"{name}.png"),
-        write_shapes(File(folder) / f"{name}.csv", about, listed),
-    ]
-
-
-def _snapshots(case: Case) -> Curve:
-    """The curve with its shapes, solved at the angles of the snapshots."""
-    return curve_of(case, case.solve(save_at=[math.pi * k / 8 for k in EIGHTHS], shapes=True))
+    return figure

@@ -139,6 +139,11 @@ class Landscape(Record):
         return self.path.status
 
     @property
+    def message(self) -> str:
+        """The path's: a sentence about the status."""
+        return self.path.message
+
+    @property
     def timing(self) -> Timing:  # type: ignore[override]
         """The path's."""
         return self.path.timing

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import der
-from der.analysis.compare import compare, table
+from der.analysis.compare import compare
 from der.bvp.solve import solve_bvp
 from der.cli.commands import main
 from der.records.path import Path
+from der.records.text import summary
 
 SECTION = der.rectangular_section(1.6)
 
@@ -55,7 +56,7 @@ def test_a_wrong_rod_is_found_out(scene, rod):
     wrong = compare(scene, replace(rod, moment=1.001 * rod.moment))
     assert 2e-4 < wrong.largest[0] < 1.1e-3
     assert wrong.within < 0.2
-    assert "beyond" in table(wrong)
+    assert "beyond" in summary(wrong)
 
 
 def test_a_fold_too_many_has_no_counterpart(scene, rod):

@@ -314,10 +314,10 @@ def test_states_are_short_in_print():
 
 def test_rounding_is_not_printed():
     """Zeros have no sign; heads and footnotes say what is meant."""
-    from der.records.states_text import words
+    from der.records.text import summary
 
     flat = RingState("flat", -6e-16, 0, 1e-12, True, 1, 0, 0.0, 0.0, False, 1, 1, 0, -2e-15, 2.0)
-    said = words(sample(gamma=0.0, states=(flat,), transitions=()))
+    said = summary(sample(gamma=0.0, states=(flat,), transitions=()))
     assert "distance a" in said
     assert "-0.0" not in said
     assert "link: " in said

@@ -23,8 +23,8 @@ from der.continuation.step import Tally
 from der.kernels.assembly import assemble
 from der.kernels.forces import Motion, gradient, no_pull
 from der.kernels.quaternions import rotation
-from der.records.landscape_text import words
 from der.records.opening import LeastPush
+from der.records.text import summary
 from der.rod.equilibrium import Control, Direction, equilibrium, moved
 from der.rod.relaxation import relax
 from der.rod.rod import State, edges, strains
@@ -405,7 +405,7 @@ def test_a_ring_that_is_no_well_is_not_pushed():
     assert found.pushes == ()
     assert found.least == {}
     assert "no well" in found.why
-    assert "no well" in words(found)
+    assert "no well" in summary(found)
     with pytest.raises(ValueError, match="push must open the ring to be plotted"):
         figure_of_push(found)
 
@@ -420,7 +420,7 @@ def test_a_grid_that_the_mesh_does_not_have(points):
 def test_words_and_picture():
     """The works in the terminal; a picture with a ring for each of the four best."""
     found = searched()
-    said = words(found)
+    said = summary(found)
     assert f"{found.best.held.work:.8g}" in said
     assert "slow force" in said
     assert "dead couple" in said

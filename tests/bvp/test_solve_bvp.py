@@ -5,10 +5,11 @@ import signal
 
 import numpy as np
 import pytest
-from boundary_value import path, scene
+from boundary_value import path
+from shapes import scene
 
 import der
-from der.bvp import solve as solving
+from der.bvp.record import Followed
 from der.bvp.solve import solve_bvp
 from der.geometry.mesh import sites
 
@@ -301,13 +302,13 @@ def test_interrupting_keeps_the_path(states):
 
 def test_ctrl_c_while_the_record_is_made_keeps_the_path(monkeypatch):
     """Pressed while the shapes are sampled, all states found: interrupted, and whole."""
-    sampled = solving._shapes
+    sampled = Followed._shapes
 
     def press_and_sample(*arguments):
         signal.raise_signal(signal.SIGINT)
         return sampled(*arguments)
 
-    monkeypatch.setattr(solving, "_shapes", press_and_sample)
+    monkeypatch.setattr(Followed, "_shapes", press_and_sample)
     with pytest.raises(der.Interrupted) as caught:
         solve_bvp(scene(der.circle(), 4.0, shapes=True))
     path = caught.value.path

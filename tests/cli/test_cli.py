@@ -742,7 +742,7 @@ def test_on_a_full_disk_an_unfinished_record_is_not_said_to_be_in_its_file(run, 
 
 def test_a_plot_that_cannot_be_written_does_not_cost_the_record(run, monkeypatch):
     """The record comes first; what failed is named, and the code is not 0."""
-    monkeypatch.setattr("der.viz.plots.style.save_figure", full)
+    monkeypatch.setattr("der.viz.plots.style.save", full)
     code, _, err = run(*SMALL, "--gamma-max", "0.5", "--json", "f.json", "--plot", "p.png")
     assert code == 3
     assert err == ["der: could not write p.png: [Errno 28] No space left on device"]

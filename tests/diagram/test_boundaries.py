@@ -14,7 +14,7 @@ import pytest
 from der.diagram.boundaries import Slice
 from der.diagram.boundaries import _Diagram as Diagram
 from der.diagram.cases import LABELS, Row, solve_case
-from der.diagram.conditions import KINDS, Lost, asymptotic, fresh, numbers
+from der.diagram.conditions import KINDS, NotFound, asymptotic, fresh, numbers
 from der.diagram.corners import Line, Met, mark_corners
 from der.diagram.corners import _has as reaches
 from der.diagram.corners import _solved as solved
@@ -29,6 +29,7 @@ from der.diagram.polylines import meetings
 from der.diagram.scan import Scan, scan
 from der.diagram.scanned_boundaries import Corner, Curve
 from der.diagram.store import Store
+from der.errors import ContinuationFailed
 
 # of circles: the fold at pi, the cusp, the slope of the folded ring; closed form the last
 THRESHOLDS = {"foldability": 1.5075766, "snap-back": 1.839582, "stability": 3.4699278}
@@ -201,7 +202,7 @@ def test_infinite_slope_is_followed_where_folded_states_merge():
 
     def value(u, state):
         if not (0.3312 < u[0] < 0.3322 and 0.2138 < u[1] < 0.2151):
-            raise Lost("outside")
+            raise NotFound("outside")
         found = infinite_slope_near(scene, u, state)
         return found.value, found
 
@@ -357,7 +358,7 @@ def tried(f, place, starts):
     """The points of a curve that are found from several states."""
     found = []
     for start in starts:
-        with suppress(Lost):
+        with suppress(ContinuationFailed):
             found.append(corrected(f, place, start))
     return found
 
@@ -416,5 +417,5 @@ def test_loose_ends_of_lines():
 
 def test_where_there_is_no_curve_nothing_is_found():
     """A positive function."""
-    with pytest.raises(Lost):
+    with pytest.raises(ContinuationFailed):
         corrected(lambda u, s: (1.0 + float(u @ u), s), np.array([0.5, 0.5]), None)

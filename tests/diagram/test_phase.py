@@ -6,11 +6,11 @@ import multiprocessing
 import re
 import time
 from collections import Counter
-from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from here import Here
 
 import der
 from der.diagram.boundaries import Boundaries
@@ -34,25 +34,10 @@ CIRCLES = {"b_over_a": (0.9, 1.0), "h_over_t": (1.25, 2.25)}
 THRESHOLDS = {"foldability": 1.5076, "snap-back": 1.8396, "stability": 3.4699}  # h/t of circles
 
 
-class Here(Executor):
-    """An executor that does its tasks at once."""
-
-    width = 1
-
-    def __init__(self):
-        self.executor = self
-
-    def submit(self, function, *given):
-        """Do a task."""
-        done = Future()
-        done.set_result(function(*given))
-        return done
-
-
 def scanned(of, folder, solve=None):
     options = {} if solve is None else {"solve": solve}
     with Store(folder / "cases.jsonl") as store:
-        return scan(of, store, Here(), progress=False, **options)
+        return scan(of, store, Here(1), progress=False, **options)
 
 
 def rows_of(file):
@@ -360,7 +345,7 @@ def test_bench_adds_up_what_cases_take():
     """Every case once; the CPU time of this process is not more than it has had."""
     before = time.process_time()
     cases = bench_phase._cases(3)
-    wall, cpu = bench_phase._wall(cases, Here(), bench_phase.timed)
+    wall, cpu = bench_phase._wall(cases, Here(1), bench_phase.timed)
     assert len(set(cases)) == 9
     assert 0.0 < cpu <= time.process_time() - before
     assert wall > 0.0

@@ -4,140 +4,47 @@ import errno
 import json
 import math
 import os
-import random
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from here import Here
+from toy_cases import (
+    CUBE,
+    NOTES,
+    POISON,
+    TOY,
+    along_that_dies_once,
+    along_with_poison,
+    deadly,
+    toy,
+    toy_that_dies_once,
+    toy_with_notes,
+    toy_with_poison,
+    wedge,
+)
 
-from der.diagram.boundaries import Boundaries
-from der.diagram.cases import LABELS, Row, solve_case
+from der.diagram.cases import Row, solve_case
 from der.diagram.distributed import follow
 from der.diagram.families import family
 from der.diagram.jobs import AHEAD
 from der.diagram.scan import BATCH, Interrupted, corners, scan, solve_all
-from der.diagram.scanned_boundaries import BoundaryPoint, Curve
 from der.diagram.store import Store
 from der.diagram.workers import Cluster, Processes, workers
-from validation.stress.kill_and_resume import (
-    NOTES,
-    Killed,
-    calm,
-    kill,
-    kill_and_resume,
-    note,
-    notes,
-)
+from validation.stress.kill_and_resume import Killed, calm, kill, kill_and_resume, notes
 
-HERE = Path(__file__).parent
+TESTS = Path(__file__).parent.parent
 SMALL = {"b_over_a": (0.9, 1.0), "h_over_t": (1.4, 2.0)}  # of fig3a: three labels, both axes
 
 
 def small():
     return replace(family("fig3a", ranges=SMALL, finest=4), coarse=2)
-
-
-def toy(case):
-    """A disc of one label in a plane of another, without any mechanics."""
-    inside = math.hypot(case.b_over_a - 0.7, (case.h_over_t - 2.0) / 7.6) < 0.13
-    label = "stable, snap-through" if inside else "unfoldable"
-    return Row(case, label, inside, inside, moment=0.0, slope=1.0, seconds=random.random())
-
-
-def toy_that_is_told(case):
-    """`toy`, which leaves a line for every case that it was given."""
-    note(case)
-    return toy(case)
-
-
-def toy_that_dies_once(case):
-    """`toy`, but the first worker to come here is killed."""
-    if abs(case.h_over_t - 2.0) < 0.3:
-        try:
-            os.close(os.open(os.environ[NOTES], os.O_CREAT | os.O_EXCL))
-        except FileExistsError:
-            return toy(case)
-        os.kill(os.getpid(), signal.SIGKILL)
-    return toy(case)
-
-
-def toy_with_poison(case):
-    """`toy`, but one case kills every worker."""
-    if case == POISON:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return toy(case)
-
-
-def slow(case):
-    """Real, and slow enough to be met in the middle."""
-    time.sleep(0.01)
-    return toy_that_is_told(case)
-
-
-def deadly(case):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def along(solve, batch):
-    """In place of following a slice: one point of a curve, and a row."""
-    (task,) = batch
-    case = task.part.family.case("x", (0.6, task.part.plane, 0.6))
-    point = BoundaryPoint(case, math.pi, 0.0, 0.0)
-    return Boundaries([Curve("foldability", "x", (point,))], []), [solve(case)]
-
-
-def along_that_dies_once(solve, batch):
-    """`along`, but the first worker to come to the middle is killed."""
-    if batch[0].part.plane == 0.5:
-        try:
-            os.close(os.open(os.environ[NOTES], os.O_CREAT | os.O_EXCL))
-        except FileExistsError:
-            return along(solve, batch)
-        os.kill(os.getpid(), signal.SIGKILL)
-    return along(solve, batch)
-
-
-def along_with_poison(solve, batch):
-    """`along`, but the slice in the middle kills every worker."""
-    if batch[0].part.plane == 0.5:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return along(solve, batch)
-
-
-def wedge(case):
-    """Foldable from h/t = 2.2 on."""
-    folds = case.h_over_t > 2.2
-    label = LABELS[3] if folds else LABELS[0]
-    return Row(case, label, folds, folds, "snap-through", moment=0.0, slope=1.0)
-
-
-TOY = replace(family("fig3a", finest=16), coarse=4)
-CUBE = replace(family("fig8a", finest=4), coarse=4)
-POISON = TOY.case("x", (0.5, 0.5))
-
-
-class Here(Executor):
-    """An executor that does its tasks at once, for scans whose workers are of no interest."""
-
-    width = 2
-
-    def __init__(self):
-        self.executor = self
-
-    def submit(self, function, *given):
-        """Do a task."""
-        done = Future()
-        done.set_result(function(*given))
-        return done
-
-    def stop(self):
-        """There is nothing to stop."""
 
 
 class Threads:
@@ -234,8 +141,8 @@ def test_rows_do_not_depend_on_order(tmp_path):
 def test_finer_scan_goes_on_with_the_cases_of_a_coarser(tmp_path, told):
     """No case twice."""
     file = tmp_path / "cases.jsonl"
-    first = scanned(TOY, file, Here(), toy_that_is_told)
-    second = scanned(family("fig3a", finest=64), file, Here(), toy_that_is_told)
+    first = scanned(TOY, file, Here(), toy_with_notes)
+    second = scanned(family("fig3a", finest=64), file, Here(), toy_with_notes)
     keys = told.read_text().split()
     assert max(Counter(keys).values()) == 1
     assert len(keys) == first.solved + second.solved == len(second.sorted_rows)
@@ -358,8 +265,8 @@ def test_workers_that_cannot_work_end_the_run(tmp_path):
 
 SCRIPT = """
 import sys
-sys.path[:0] = [{house!r}, {here!r}]
-from test_scan import TOY, slow
+sys.path[:0] = [{root!r}, {tests!r}]
+from toy_cases import TOY, slow
 from der.diagram.scan import Interrupted, scan
 from der.diagram.store import Store
 from der.diagram.workers import workers
@@ -377,7 +284,7 @@ def run(folder):
     """A run in a process of its own."""
     file = folder / "cases.jsonl"
     script = folder / "run.py"
-    script.write_text(SCRIPT.format(house=str(HERE.parent), here=str(HERE), file=str(file)))
+    script.write_text(SCRIPT.format(root=str(TESTS.parent), tests=str(TESTS), file=str(file)))
     return subprocess.Popen(
         [sys.executable, str(script)], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -469,9 +376,8 @@ def test_interrupted_is_a_keyboard_interrupt():
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory):
-    """A small part of fig3a, by one process."""
-    with workers(1) as crew:
-        return scanned(small(), tmp_path_factory.mktemp("real") / "c.jsonl", crew, solve_case)
+    """A small part of fig3a, by this process."""
+    return scanned(small(), tmp_path_factory.mktemp("real") / "c.jsonl", Here(), solve_case)
 
 
 def test_real_scan_sees_the_three_modes(real):

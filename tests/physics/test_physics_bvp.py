@@ -9,12 +9,15 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
-from boundary_value import Row, as_printed, path, rows, scene, state_at, system, visits
+from boundary_value import Row, as_printed, path, points, rows, state_at, system
 from scipy.optimize import brentq
+from shapes import scene
 
 import der
-from der.bvp.continuation import Tally, Wanted, follow
+from der.bvp.continuation import follow
+from der.bvp.events import Wanted
 from der.bvp.solve import solve_bvp
+from der.bvp.step import Statistics
 from validation.stress.random_rings import largest_error, random_rings, survey, work_missing
 
 CIRCLE = der.circle()
@@ -34,8 +37,8 @@ def folds(h_over_t: float) -> list[float]:
 def first_fold(h_over_t: float) -> der.Point:
     """The first fold of a circle, whether before pi or beyond."""
     wanted = Wanted(gamma_max=4.0, targets=(), tolerance=TIGHT)
-    states = follow(system(CIRCLE, h_over_t), wanted, Tally())
-    return next(visit.at for visit in states if visit.kind == "fold")
+    states = follow(system(CIRCLE, h_over_t), wanted, Statistics())
+    return next(point.solution for point in states if point.kind == "fold")
 
 
 # --- strangers --------------------------------------------------------------------------------
@@ -151,7 +154,7 @@ def test_folds_are_those_of_the_reference(name):
 @pytest.mark.parametrize("h_over_t", [0.3, 1.0, 2.0, 4.0, 8.0])
 def test_stiffness_of_the_flat_circle(h_over_t):
     """dM/dgamma = 1/[pi/(4 beta) + pi/4 - 2/pi], linear theory; 1e-6 on the coarse first mesh."""
-    start = visits(system(CIRCLE, h_over_t), 0.1)[0].at
+    start = points(system(CIRCLE, h_over_t), 0.1)[0].solution
     beta = der.rectangular_section(h_over_t).beta
     expected = 1 / (math.pi / (4 * beta) + math.pi / 4 - 2 / math.pi)
     assert start.slope == pytest.approx(expected, rel=1e-6)
@@ -271,7 +274,7 @@ def test_energy_is_the_work_done_along_the_path(ring, h_over_t):
     Integrated by Hermite's rule in arc length with the tangents' rates; its error is of order 4 in
     steps that turn by 0.15 rad.
     """
-    states = [visit.at for visit in visits(system(ring, h_over_t), math.pi)]
+    states = [point.solution for point in points(system(ring, h_over_t), math.pi)]
     work = 0.0
     for a, b in pairwise(states):
         jump = np.array([b.gamma - a.gamma, b.moment - a.moment])

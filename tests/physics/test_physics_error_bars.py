@@ -7,14 +7,14 @@ far below the goals of issue 3: curve error 2e-5 at h/t = 2, 4, 8 and 3e-4 at 1 
 
 import functools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from references import reference
 from scipy.optimize import brentq
 
 import der
-from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error, read_reference
+from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error
 from der.analysis.error_bars import ErrorBars, error_bars
 from der.bvp.solve import solve_bvp
 from der.continuation.arclength import follow
@@ -23,16 +23,8 @@ from der.continuation.step import Tally
 from der.rod.gripped_ring import sector
 from der.scene import meshes
 
-REFERENCE = Path(__file__).parents[2] / "validation" / "reference"
-NAMES = {4.0: "circ_ht4", 1.6: "circ_ht1.6", 1.0: "circ_ht1_beyond_pi"}
 EIGHTHS = tuple(k * math.pi / 8.0 for k in range(17))
 NOISE = 1e-9  # of the scaled curve: what the reference's 11 digits and its spline leave uncertain
-
-
-@functools.cache
-def reference(h_over_t: float) -> ReferenceCurve:
-    """Read the boundary-value solution of a circle."""
-    return read_reference(REFERENCE / f"{NAMES[h_over_t]}.csv")
 
 
 def followed(h_over_t: float, n_edges: int) -> list[Visit]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rods import dense, on_conditions, richardson
 from scipy.interpolate import CubicSpline
+from shapes import scene
 
 import der
 from der.analysis.landscape.barrier import barrier
@@ -26,10 +27,6 @@ SHAPES = [
     (der.rectangle(0.6, 0.3), 4.0),
     (der.triangle(math.pi / 2, 1 / 15), 8.0),
 ]
-
-
-def scene(ring, h_over_t, **numerics):
-    return der.Scene(ring, der.rectangular_section(h_over_t), **numerics)
 
 
 @functools.cache

@@ -8,28 +8,21 @@ import functools
 import math
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
+from references import reference
 from rods import richardson
 from scipy.interpolate import make_interp_spline
 
 import der
-from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error, read_reference
+from der.analysis.curve_distance import curve_error, fold_error
 from der.analysis.request import Request
 from der.kernels.linking import link, twist
 from der.problem import Options
 from der.rod.gripped_ring import gripped_ring
 
-REFERENCE = Path(__file__).parents[2] / "validation" / "reference"
 BARE = Request(targets=(), stability=False, self_crossings=False)
-NAMES = {4.0: "circ_ht4", 1.6: "circ_ht1.6", 1.0: "circ_ht1_beyond_pi"}
-
-
-def reference(h_over_t: float) -> ReferenceCurve:
-    """Read the boundary-value solution of a circle."""
-    return read_reference(REFERENCE / f"{NAMES[h_over_t]}.csv")
 
 
 def circle(h_over_t: float, n_edges: int = 64, **wants: object) -> der.Scene:

@@ -30,9 +30,10 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, jv
 
 from der.kernels.assembly import assemble
 from der.kernels.quaternions import rotation
-from der.rod.gripped_ring import free_ring
-from der.rod.rod import State, edges, rod
-from der.rod.supports import supports
+from der.rod.gripped_ring import free_supports
+from der.rod.rod import State, discrete_rod, edges
+from der.rod.supports import supported
+from der.rod.system import RodSystem
 
 COARSE = (16, 32, 64)
 FINE = (32, 64, 128)
@@ -49,12 +50,16 @@ def along_e3(n_cells):
     return turned_about(3, np.zeros(n_cells + 1))
 
 
-def clamped_clamped(body, **load):
-    """Both ends clamped, the far one sliding along E3."""
-    one = np.ones(body.n_edges)
-    return supports(
-        body, clamped=(0, body.n_edges - 1), held=((one, E1, 0.0), (one, E2, 0.0)), **load
-    )
+def clamped(rod, **load):
+    """A rod clamped at its first edge."""
+    return RodSystem(rod, supported(rod, clamped=(0,), **load))
+
+
+def clamped_clamped(rod, **load):
+    """A rod clamped at both ends, the far one sliding along E3."""
+    one = np.ones(rod.n_edges)
+    conditions = ((one, E1, 0.0), (one, E2, 0.0))
+    return RodSystem(rod, supported(rod, clamped=(0, rod.n_edges - 1), held=conditions, **load))
 
 
 # --- critical loads -------------------------------------------------------------------------
@@ -74,11 +79,11 @@ def test_twisted_ring_buckles_at_michells_twist(measure, tolerance):
         def index(total):
             cell = np.full(n, 2 * np.pi / n)
             rest = np.outer(np.full(n, -total / n), E3)
-            body = rod(cell, rest, (1.0, 1.0, GJ), measure=measure, closed=True)
-            held = free_ring(body)
-            held.free[n // 2, 2] = False
-            circle = unloaded(body, turned_about(1, cell[0] * np.arange(n)), 3)
-            return index_of(body, held, solved(body, held, circle).state)
+            rod = discrete_rod(cell, rest, (1.0, 1.0, GJ), measure=measure, closed=True)
+            ring = RodSystem(rod, free_supports(rod))
+            ring.supports.free[n // 2, 2] = False
+            circle = unloaded(rod, turned_about(1, cell[0] * np.arange(n)), 3)
+            return index_of(ring, solved(ring, circle).state)
 
         assert (index(15.0), index(16.5)) == (0, 2)
         return first_change(index, 15.0, 16.5)
@@ -98,15 +103,15 @@ def test_twisted_rod_buckles_at_greenhills_moment(measure, tolerance):
     GJ = 0.77
 
     def critical(n):
-        body = straight(n, (1.0, 1.0, GJ), measure=measure)
-        held = clamped_clamped(body, turn={n: 1.0})
+        rod = straight(n, (1.0, 1.0, GJ), measure=measure)
+        shaft = clamped_clamped(rod, turn={n: 1.0})
 
         def index(moment):
             twist = moment / GJ
-            state = unloaded(body, turned_about(3, twist * np.arange(n + 1) / n), 2, twist)
-            at = solved(body, held, state)
+            state = unloaded(rod, turned_about(3, twist * np.arange(n + 1) / n), 2, twist)
+            at = solved(shaft, state)
             assert at.moment == pytest.approx(moment, rel=1e-12)
-            return index_of(body, held, at.state)
+            return index_of(shaft, at.state)
 
         assert (index(8.5), index(9.5)) == (0, 2)
         return first_change(index, 8.5, 9.5)
@@ -124,11 +129,11 @@ def test_clamped_column_buckles_at_eulers_load(measure):
     """
 
     def critical(n):
-        body = straight(n, (1.0, 3.0, 0.5), measure=measure)
-        held = clamped_clamped(body, pull=-E3)
+        rod = straight(n, (1.0, 3.0, 0.5), measure=measure)
+        column = clamped_clamped(rod, pull=-E3)
 
         def index(load):
-            return index_of(body, held, unloaded(body, along_e3(n), 2, load))
+            return index_of(column, unloaded(rod, along_e3(n), 2, load))
 
         assert (index(39.0), index(40.0)) == (0, 1)
         return first_change(index, 39.0, 40.0)
@@ -147,12 +152,12 @@ def test_cantilever_buckles_sideways_at_prandtls_load(measure):
     GJ = 0.6
 
     def critical(ratio, n):
-        body = straight(n, (ratio, 1.0, GJ), measure=measure)
-        held = supports(body, clamped=(0,), pull=E2)
+        rod = straight(n, (ratio, 1.0, GJ), measure=measure)
+        beam = clamped(rod, pull=E2)
 
         def index(load):
-            at = solved(body, held, unloaded(body, along_e3(n), 0, load))
-            return index_of(body, held, at.state)
+            at = solved(beam, unloaded(rod, along_e3(n), 0, load))
+            return index_of(beam, at.state)
 
         assert (index(3.0), index(3.2)) == (0, 1)
         return first_change(index, 3.0, 3.2)
@@ -169,11 +174,11 @@ def test_cantilever_buckles_sideways_at_prandtls_load(measure):
 
 
 def post_buckled(n, measure, load):
-    body = straight(n, (1.0, 3.0, 0.5), measure=measure)
-    held = clamped_clamped(body, pull=-E3)
+    rod = straight(n, (1.0, 3.0, 0.5), measure=measure)
+    column = clamped_clamped(rod, pull=-E3)
     s = np.arange(n + 1) / n
     wave = turned_about(1, 0.5 * np.pi * np.sin(2 * np.pi * s))
-    return body, held, unloaded(body, wave, 2, load)
+    return column, unloaded(rod, wave, 2, load)
 
 
 @by_measure(1e-8, 1e-8, 1e-5)
@@ -189,21 +194,21 @@ def test_post_buckled_column_is_shortened_as_the_elastica(measure, tolerance):
     assert shortened == pytest.approx(0.5430534, abs=6e-8)
 
     def shortening(n):
-        body, held, start = post_buckled(n, measure, load)
-        return 1 - edges(body, solved(body, held, start).state).sum(axis=0)[2]
+        column, start = post_buckled(n, measure, load)
+        return 1 - edges(column.rod, solved(column, start).state).sum(axis=0)[2]
 
     assert richardson(*map(shortening, FINE)) == pytest.approx(shortened, abs=tolerance)
 
 
 def cantilever(n, load, **options):
     """Cantilever under the tip load ``load`` along E2, and its tip (3,)."""
-    body = straight(n, (1.0, 3.0, 0.5), **options)
-    held = supports(body, clamped=(0,), pull=E2)
-    held.free[0, 3:] = True  # the clamp holds the frame, not the length
+    rod = straight(n, (1.0, 3.0, 0.5), **options)
+    beam = clamped(rod, pull=E2)
+    beam.supports.free[0, 3:] = True  # the clamp holds the frame, not the length
     s = np.arange(n + 1) / n
-    start = unloaded(body, turned_about(1, -np.arctan(0.5 * load) * s * (2 - s)), 0, load)
-    at = solved(body, held, start)
-    return body, at, edges(body, at.state).sum(axis=0)
+    start = unloaded(rod, turned_about(1, -np.arctan(0.5 * load) * s * (2 - s)), 0, load)
+    at = solved(beam, start)
+    return rod, at, edges(rod, at.state).sum(axis=0)
 
 
 def bisshopp_drucker(load):
@@ -249,9 +254,9 @@ def test_a_stiff_rod_stretches_by_castiglianos_theorem(load):
     EA = 1e6
 
     def tension_energy(force):
-        body, at, _ = cantilever(32, force)
+        rod, at, _ = cantilever(32, force)
         tension = force * rotation(at.state.quat)[:, 1, 2]
-        return 0.5 * np.sum(body.length * tension**2) / EA
+        return 0.5 * np.sum(rod.length * tension**2) / EA
 
     grown = cantilever(32, load, stretching=EA)[2][1] - cantilever(32, load)[2][1]
     h = 1e-3 * load
@@ -266,7 +271,7 @@ def crumpled(measure, stretching):
     """Return an open rod with uneven cells and natural strains, bent and twisted at random."""
     rng = np.random.default_rng(1)
     n = 20
-    body = rod(
+    rod = discrete_rod(
         rng.uniform(0.05, 0.1, n),
         0.3 * rng.normal(size=(n, 3)),
         (1.0, 3.0, 0.7),
@@ -277,11 +282,11 @@ def crumpled(measure, stretching):
     for j, turn in enumerate(0.4 * rng.normal(size=(n, 3))):
         quat[j + 1 : j + 2] = turned_all(quat[j : j + 1], turn[None])
     stretch = 0.1 * rng.normal(size=n + 1) * (stretching > 0)
-    return body, State(quat, stretch, np.zeros(0), 0.0)
+    return rod, State(quat, stretch, np.zeros(0), 0.0)
 
 
-def derivatives(body, held, state):
-    return assemble(body, held, state.quat, state.stretch, state.force, state.load)
+def derivatives(system, state):
+    return assemble(system.rod, system.supports, state.quat, state.stretch, state.force, state.load)
 
 
 @pytest.mark.parametrize("stretching", [0.0, 50.0])
@@ -292,8 +297,8 @@ def test_a_free_rod_has_no_net_moment(measure, stretching):
     Positions are no unknowns (edges are lengths times tangents), so there is no net force to ask
     for. Rounding of entries near 50.
     """
-    body, state = crumpled(measure, stretching)
-    grad = derivatives(body, supports(body), state).grad[:, :3]
+    rod, state = crumpled(measure, stretching)
+    grad = derivatives(RodSystem(rod, supported(rod)), state).grad[:, :3]
     assert np.abs(grad).max() > 10
     moment = np.einsum("jab,jb->a", rotation(state.quat), grad)
     np.testing.assert_allclose(moment, 0.0, rtol=0, atol=2e-13)
@@ -303,10 +308,10 @@ def test_a_free_rod_has_no_net_moment(measure, stretching):
 @pytest.mark.parametrize("measure", MEASURES)
 def test_energy_does_not_change_under_a_rigid_rotation(measure, stretching):
     """Frame indifference, at a rotation too large to be linear; to rounding."""
-    body, state = crumpled(measure, stretching)
+    rod, state = crumpled(measure, stretching)
     turned = state.but(quat=turned_rigidly(state.quat, np.array([0.9, -1.4, 0.6])))
-    held = supports(body)
-    before, after = derivatives(body, held, state), derivatives(body, held, turned)
+    free = RodSystem(rod, supported(rod))
+    before, after = derivatives(free, state), derivatives(free, turned)
     assert after.energy == pytest.approx(before.energy, rel=2e-15)
 
 
@@ -316,11 +321,11 @@ def test_a_clamp_carries_the_moment_of_a_dead_load():
     Exact on any mesh, up to the residual of the solve, 1e-10 on each of 24 free frames.
     """
     pull = np.array([0.3, 1.0, -0.2])
-    body = straight(24, (1.0, 3.0, 0.5))
-    held = supports(body, clamped=(0,), pull=pull)
-    at = solved(body, held, unloaded(body, along_e3(24), 0, 1.0))
-    tip = edges(body, at.state).sum(axis=0)
-    reaction = rotation(at.state.quat)[0] @ derivatives(body, held, at.state).grad[0]
+    rod = straight(24, (1.0, 3.0, 0.5))
+    beam = clamped(rod, pull=pull)
+    at = solved(beam, unloaded(rod, along_e3(24), 0, 1.0))
+    tip = edges(rod, at.state).sum(axis=0)
+    reaction = rotation(at.state.quat)[0] @ derivatives(beam, at.state).grad[0]
     np.testing.assert_allclose(reaction, -np.cross(tip, pull), rtol=0, atol=3e-9)
 
 
@@ -334,8 +339,9 @@ def null_modes(eigenvalues):
 @pytest.mark.parametrize("stretching", [0.0, 50.0])
 def test_a_straight_free_rod_has_three_null_modes(stretching):
     """The rigid rotations, exactly; translations are no unknowns here."""
-    body = straight(20, (1.0, 3.0, 0.7), stretching=stretching)
-    hess, border = dense(body, supports(body), unloaded(body, along_e3(20), 0))
+    rod = straight(20, (1.0, 3.0, 0.7), stretching=stretching)
+    free = RodSystem(rod, supported(rod))
+    hess, border = dense(free, unloaded(rod, along_e3(20), 0))
     eigenvalues = on_conditions(hess, border)
     assert null_modes(eigenvalues) == 3
     assert eigenvalues[3] > 0
@@ -349,9 +355,9 @@ def test_an_isotropic_naturally_straight_ring_may_spin(EI2, kappa0, expected):
 
     Only where neither the section nor the natural shape prefers a direction.
     """
-    body, state = covered_circle(1, kappa0, (1.0, EI2, 0.7), 24)
-    held = free_ring(body)
-    held.free[0] = True
-    eigenvalues = on_conditions(*dense(body, held, state))
+    rod, state = covered_circle(1, kappa0, (1.0, EI2, 0.7), 24)
+    ring = RodSystem(rod, free_supports(rod))
+    ring.supports.free[0] = True
+    eigenvalues = on_conditions(*dense(ring, state))
     assert null_modes(eigenvalues) == expected
     assert eigenvalues[expected] > 0

@@ -11,8 +11,8 @@ import pytest
 
 import der
 from der.analysis.loading import follow_angle, follow_moment
-from der.analysis.snap import Landing
 from der.analysis.request import Request
+from der.analysis.snap import Landing
 from der.problem import Point, Statistics
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
@@ -148,7 +148,7 @@ def test_limits_of_a_circle_under_a_dead_moment():
     moments = []
     for n_edges in (64, 128, 256):
         ring = circle(4.0, n_edges=n_edges)
-            points = follow_moment(ring, BARE, Statistics(), unload=True)
+        points = follow_moment(ring, BARE, Statistics(), unload=True)
         moments.append([ring.arm_moment(v.solution.moment) for v in points if v.kind == "limit"])
     coarse, middle, fine = np.array(moments)
     once, twice = middle + (middle - coarse) / 3.0, fine + (fine - middle) / 3.0

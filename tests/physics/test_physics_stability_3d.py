@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 from rods import dense, lifted, on_conditions, richardson
+from shapes import scene
 
 import der
 from der.continuation.arclength import follow
@@ -39,9 +40,7 @@ SHAPES = [
 
 @functools.cache
 def folded(ring, h_over_t, **numerics):
-    return der.fold(
-        der.Scene(ring, der.rectangular_section(h_over_t), self_crossings=False, **numerics)
-    )
+    return der.fold(scene(ring, h_over_t, self_crossings=False, **numerics))
 
 
 # --- the index identity -------------------------------------------------------------------------

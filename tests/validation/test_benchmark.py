@@ -4,13 +4,13 @@ import json
 import math
 import subprocess
 import sys
-from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import nullcontext
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 import pytest
+from here import Here
 
 import der
 from der.analysis.curve_distance import read_reference
@@ -277,29 +277,9 @@ def test_stepping_refuses_a_ring_without_quarter():
 # --- The sweep -------------------------------------------------------------------------------
 
 
-class Here:
-    """Workers that are this process."""
-
-    @property
-    def executor(self):
-        """Itself."""
-        return self
-
-    def submit(self, work, *arguments):
-        """Work at once."""
-        task = Future()
-        task.set_result(work(*arguments))
-        return task
-
-
 def test_sweep_counts_rings_and_holds_its_bars(monkeypatch):
     """Every ring is accounted for, and the true error of M is within what was asked for."""
-
-    @contextmanager
-    def here(_):
-        yield Here()
-
-    monkeypatch.setattr(sweep, "workers", here)
+    monkeypatch.setattr(sweep, "workers", lambda number: nullcontext(Here(number)))
     rows = {row.case: row.value for row in sweep.rows(2, 1)}
     for method in sweep.METHODS:
         assert rows[f"{method}, rings with M to 0.0001"] == 2

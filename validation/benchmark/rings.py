@@ -18,7 +18,7 @@ import numpy as np
 
 import der
 from der.analysis.curve_distance import ReferenceCurve, curve_error, fold_error, read_reference
-from der.bvp.solve import FINEST, solve_visits
+from der.bvp.solve import FINEST, solve_with_points
 from validation.benchmark.rows import Row, counts, finite
 
 TABLES = Path(__file__).parents[1] / "reference"
@@ -97,8 +97,8 @@ def known(case: BenchRing, states: int) -> Known:
 
 def _curve(case: BenchRing, states: int, shift: float) -> ReferenceCurve:
     places = (np.arange(1, states) + shift) * math.pi / states
-    path, visits = solve_visits(case.scene(save_at=tuple(places)), tolerance=FINEST)
-    others = np.array([visit.at.p for visit in visits])
+    path, points = solve_with_points(case.scene(save_at=tuple(places)), tolerance=FINEST)
+    others = np.array([point.solution.p for point in points])
     scaled = np.column_stack([path.gamma, path.moment, path.energy, others])
     scaled /= np.abs(scaled).max(axis=0)
     kept = [0]

@@ -14,18 +14,18 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
+from der.analysis.work import work_missing as work_missing
 from der.bvp.solve import TOLERANCE, solve_bvp
 from der.errors import NotConverged
-from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
-from der.geometry.section import Section, rectangular_section
+from der.geometry.ring import Ring
+from der.geometry.section import Section
 from der.records.path import Path
 from der.scene import Scene
+from scenarios.random_folds import random_rings as random_rings
 
 LOOSE = 1e-3  # of U: what the work between states is known to by interpolation
 DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt
-SAME_STATE = 1e-9  # of the length of the path: two states closer than this are one
 
 
 @dataclass(frozen=True)
@@ -50,33 +50,6 @@ class Survey:
     def named(self, name: str) -> tuple[Suspect, ...]:
         """The suspects of one name."""
         return tuple(suspect for suspect in self.suspects if suspect.name == name)
-
-
-def random_rings(count: int, seed: int) -> Iterator[tuple[Ring, Section]]:
-    """Rings and sections, uniform over the ranges of figures 2, 3, 5 and 8; circles in log h/t.
-
-    nu is uniform from 0 to 0.5, and its ends and 0.3 have their turns too.
-    """
-    random = np.random.default_rng(seed)
-    for _ in range(count):
-        shape = random.choice(["circle", "ellipse", "rectangle", "triangle"])
-        axis = str(random.choice(["x", "y"]))
-        nu = float(random.choice([0.0, 0.3, 0.5, random.uniform(0.0, 0.5)]))
-        h_over_t = float(random.uniform(1.0, 4.0))
-        if shape == "circle":
-            ring = circle()
-            h_over_t = float(np.exp(random.uniform(math.log(0.2), math.log(60.0))))
-        elif shape == "ellipse":
-            ring = ellipse(float(random.uniform(0.5, 1.0)), axis)
-            h_over_t = float(random.uniform(0.2, 4.0))
-        elif shape == "rectangle":
-            b = float(random.uniform(0.2, 1.0))
-            ring = rectangle(b, float(random.uniform(0.1, b)), axis)
-        else:
-            apex = math.radians(float(random.uniform(30.0, 120.0)))
-            inscribed = 0.5 * math.tan(math.pi / 4 - apex / 4)
-            ring = triangle(apex, float(random.uniform(0.033, inscribed)))
-        yield ring, rectangular_section(h_over_t, nu)
 
 
 def survey(count: int, seed: int, tolerance: float = TOLERANCE) -> Survey:
@@ -122,17 +95,3 @@ def largest_error(path: Path) -> float:
     }
     errors: Mapping[str, Any] = path.error or {}
     return max(float(np.max(errors[name])) / scale for name, scale in scales.items())
-
-
-def work_missing(path: Path) -> float:
-    """Largest difference of U from the work 4 M dgamma along the path, over the largest U."""
-    scaled = np.column_stack([path.gamma / math.pi, path.moment / np.abs(path.moment).max()])
-    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1)))
-    new = np.append(True, np.diff(length) > SAME_STATE * length[-1])
-    length, gamma, moment, energy = length[new], path.gamma[new], path.moment[new], path.energy[new]
-    curve = make_interp_spline(length, np.column_stack([gamma, moment]), k=3)
-    nodes, weights = np.polynomial.legendre.leggauss(6)
-    half = 0.5 * np.diff(length)[:, None]
-    s = length[:-1, None] + half * (1.0 + nodes)
-    work = 4.0 * (curve(s)[..., 1] * curve(s, 1)[..., 0] * half) @ weights
-    return float(np.abs(np.cumsum(work) - (energy[1:] - energy[0])).max() / energy.max())

@@ -1,0 +1,127 @@
+"""What was found on the path of a boundary-value problem, and the record of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from der.bvp.collocation import Collocation, Solution
+from der.bvp.events import Point
+from der.bvp.full_ring import full_ring, turning
+from der.bvp.gauss import Array
+from der.bvp.step import Statistics
+from der.errors import Reason
+from der.geometry.mesh import sites
+from der.records import path as records
+from der.records.configurations import Shapes
+from der.records.path import AtPi, Mode, Path, Timing, folding_mode, release
+from der.scene import Scene
+from der.utils.checks import counts
+
+FLAT = 1e-6  # out-of-plane extent of a folded ring, a
+HOW = (
+    "change of the state, across the path, on a collocation mesh of half the intervals' length; "
+    "Gauss collocation of 4 stages, of order 8 at the ends of intervals"
+)
+
+
+@dataclass
+class Followed:
+    """A path as far as it has been followed."""
+
+    scene: Scene
+    system: Collocation
+    tolerance: float
+    points: list[Point] = field(default_factory=list)
+    statistics: Statistics = field(default_factory=Statistics)
+
+    @property
+    def turned_back(self) -> bool:
+        """Whether the path ends at -gamma_max."""
+        return self.points[-1].solution.gamma == -self.scene.gamma_max
+
+    def three_covered(self, at: Solution) -> bool:
+        """Whether a solution is the planar ring of turning number 3."""
+        extent = 2.0 * float(np.abs(at.places[:, 0]).max())
+        return extent < FLAT and abs(turning(self.system, at) - 6.0 * math.pi) < 0.1
+
+    def record(self, timing: Timing, status: str, message: str, reason: Reason | None) -> Path:
+        """Return the record of the path."""
+        solutions = [point.solution for point in self.points]
+        gamma, moment, energy = (
+            np.array([getattr(at, name) for at in solutions])
+            for name in ("gamma", "moment", "energy")
+        )
+        special = tuple(
+            records.Point(p.kind, at.gamma, at.moment, at.energy, None, None, k)
+            for k, (p, at) in enumerate(zip(self.points, solutions, strict=True))
+            if p.kind
+        )
+        at_pi, mode = self._judged(gamma, moment, special)
+        if reason is Reason.TURNED_BACK and float(gamma.max()) < math.pi:
+            mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
+        unknown = counts("index", [None] * len(solutions))
+        error = {
+            name: [float(getattr(point.error, name)) for point in self.points]
+            for name in ("gamma", "moment", "energy")
+        }
+        return Path(
+            solver="bvp",
+            ring=self.scene.ring.to_json(),
+            section=asdict(self.scene.section),
+            numerics=self._numerics(),
+            gamma=gamma,
+            moment=moment,
+            energy=energy,
+            index=unknown,
+            index_moment=unknown,
+            points=special,
+            at_pi=at_pi,
+            mode=mode,
+            error=error | {"how": HOW},
+            timing=timing,
+            shapes=self._shapes() if self.scene.shapes and solutions else None,
+            status=status,
+            message=message,
+            reason="" if reason is None else reason.word,
+        )
+
+    def _judged(
+        self, gamma: Array, moment: Array, special: tuple[records.Point, ...]
+    ) -> tuple[AtPi | None, Mode | None]:
+        """The state at the first arrival at pi, and the folding mode; None where there is none."""
+        if math.pi not in gamma:
+            return None, None
+        k = int(np.argmax(gamma == math.pi))
+        at = self.points[k].solution
+        at_pi = AtPi(at.moment, at.slope, at.energy, None, None, None)
+        before = tuple(point for point in special if point.position <= k)
+        mode = folding_mode(
+            gamma[: k + 1], moment[: k + 1], before, at_pi, three_covered=self.three_covered(at)
+        )
+        return at_pi, mode
+
+    def _numerics(self) -> dict[str, object]:
+        """How the path was solved."""
+        scene, system = self.scene, self.system
+        meshes = [point.solution.mesh for point in self.points]
+        return {
+            "method": "Gauss collocation",
+            "stages": len(system.rule.points),
+            "intervals": max((len(mesh.h) for mesh in meshes), default=0),
+            "sector": "quarter" if system.sector.piece.quarter else "half",
+            "tolerance": self.tolerance,
+            "gamma_max": scene.gamma_max,
+            "until": scene.until,
+            "save_at": None if scene.save_at is None else list(scene.save_at),
+            "version": release(),
+        }
+
+    def _shapes(self) -> Shapes:
+        """Vertices and frames of the full ring at every point."""
+        n_edges = self.scene.n_edges
+        shapes = [full_ring(self.system, point.solution, n_edges) for point in self.points]
+        x, frames = (np.array(parts) for parts in zip(*shapes, strict=True))
+        return Shapes(x, frames, arc_length=sites(self.scene.ring, n_edges, "full")[:-1])

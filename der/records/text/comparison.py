@@ -1,0 +1,58 @@
+"""Rod against boundary-value problem in a table."""
+
+from __future__ import annotations
+
+import math
+
+from der.records.comparison import Comparison
+from der.records.text.table import table
+
+_HEADS = (
+    ("", -8),
+    ("gamma", 12),
+    ("M rod", 14),
+    ("M bvp", 14),
+    ("distance", 11),
+    ("bar", 10),
+    ("", 0),
+)
+
+
+def lines(found: Comparison) -> list[str]:
+    """The differences at the states that were asked for, and at folds and limits."""
+    asked = _asked(found)
+    rows = [
+        (
+            state.kind,
+            f"{state.gamma:.8f}",
+            f"{state.rod_moment:.9f}",
+            f"{state.bvp_moment:.9f}",
+            f"{state.moment_distance:.1e}",
+            "" if state.moment_bar is None else f"{state.moment_bar:.1e}",
+            "  beyond" if state.agrees is False else "",
+        )
+        for state in found.states
+        if state.kind or state.gamma in asked
+    ]
+    told = table(_HEADS, rows)
+    for pair in found.pairs:
+        bar = "" if pair.bar is None else f", bar {pair.bar:.1e}"
+        told.append(
+            f"{pair.kind:8}{pair.rod_gamma:12.8f}{'':14}{pair.bvp_gamma:12.8f} by bvp: "
+            f"{pair.difference:.1e} rad apart{bar}"
+        )
+    moment, energy = found.largest
+    told.append(f"largest normal distance: {moment:.1e} in M, {energy:.1e} in U (scaled planes)")
+    if not math.isnan(found.within):
+        told.append(f"{100 * found.within:.1f} % of the states agree within their error bars")
+    if found.unmatched:
+        told.append(f"{found.unmatched} states or special points have no counterpart")
+    return told
+
+
+def _asked(found: Comparison) -> set[float]:
+    """Gammas that the user asked for, or the multiples of pi/8."""
+    listed = found.rod.numerics.get("save_at")
+    if isinstance(listed, list):
+        return {*listed, math.pi}
+    return {k * math.pi / 8.0 for k in range(-80, 81)}

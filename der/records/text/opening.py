@@ -1,0 +1,43 @@
+"""What it takes to push a ring open in a few lines of text."""
+
+from __future__ import annotations
+
+from der.records.opening import Instant, LeastPush, Push
+from der.records.text.table import count, floor, number
+
+_EVENTS = {
+    "pass": "carried to a saddle",
+    "fold": "snaps at a fold",
+    "branch": "snaps at a branch point",
+    "limit": "limit of the load",
+    "end": "end",
+}
+
+
+def lines(found: LeastPush) -> list[str]:
+    """The pushes of least work, by kind, and the barriers beside them."""
+    told = [f"{len(found.pushes)} pushes at pairs of {found.numerics['points']} points and between"]
+    for name, places, dead in (("slow", found.least, False), ("dead", found.least_dead, True)):
+        for kind, k in places.items():
+            one = found.pushes[k]
+            instant = one.dead if dead else one.held
+            if instant is not None:
+                told.append(_push(f"{name} {kind}", one, instant, floor(found)))
+                key = f"{kind} dead" if dead else kind
+                if key in found.extrapolated:
+                    work, error = found.extrapolated[key]
+                    told.append(f"    work extrapolated {work:.8g} +- {error:.1e} GJ/a")
+    for name, value in (("of the free ring", found.barrier), ("by twisting", found.twisting)):
+        text = "none" if value is None else f"{value:.8g} GJ/a on the mesh"
+        told.append(f"barrier to open {name}: {text}")
+    return told
+
+
+def _push(name: str, one: Push, at: Instant, least: float) -> str:
+    places = ", ".join(f"{s:.5g}" for s in one.points)
+    return (
+        f"{name + ':':13}work {at.work:.8g}, load {number(at.load, '.5g', least)} "
+        f"(largest {one.peak:.5g}), push {at.push:.5g}; s/L = {places}, {one.direction}; "
+        f"{_EVENTS[at.event]}, index {count(at.index_before)}/{count(at.index_after)}, "
+        f"end state when released: {at.lands}"
+    )

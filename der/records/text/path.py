@@ -1,0 +1,85 @@
+"""A path in a few lines of text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from der.records.path import AtPi, Mode, Path, Point
+from der.records.text.table import change, floor, number, table, title
+
+_FAR = 1e-2  # rad: a snap over more, under a dead moment, says where it began
+_HEADS = (("", -9), ("gamma", 12), ("gamma/pi", 10), ("M a/GJ", 12), ("U a/GJ", 12), ("  index", 0))
+
+
+def lines(path: Path) -> list[str]:
+    """The ring, its mode, the special points, and the cost."""
+    found = [title(path)]
+    if path.mode is not None:
+        found.append(mode_text(path.mode))
+    elif path.status == "done" and path.at_pi is None and len(path):
+        found.append(f"ends at gamma = {path.gamma[-1]:.6g}, before pi")
+    if path.message:
+        found.append(path.message if path.status == "done" else f"{path.status}: {path.message}")
+    if path.points:
+        found += ["", *table(_HEADS, map(_row, path.points))]
+    if path.at_pi is not None:
+        found += ["", _at_pi(path.at_pi, floor(path))]
+    if path.error is not None:
+        found.append(_errors(path))
+    t = path.timing
+    found.append(
+        f"{len(path)} states, {t.steps} steps, {t.newton_iterations} Newton iterations, "
+        f"{1e3 * t.solve_s:.0f} ms"
+    )
+    return found
+
+
+def mode_text(mode: Mode) -> str:
+    """The folding mode as a phrase."""
+    parts = ["foldable" if mode.foldable else "not foldable"]
+    if mode.stable is not None:
+        parts.append("stable when folded" if mode.stable else "unstable when folded")
+    parts.append("no snap" if mode.snapping == "none" else mode.snapping)
+    if mode.stable_3d is not None:
+        stable = "stable" if mode.stable_3d else "unstable"
+        parts.append(f"{stable} in 3D at pi (moment held)")
+    return ", ".join(parts)
+
+
+def _row(point: Point) -> tuple[str, ...]:
+    index = change(point.index_before, point.index_after)
+    extra = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in point.details.items())
+    if point.kind == "snap":
+        extra = f"releases {point.details['energy_released']:.7g}"
+        start = point.details.get("gamma_fold")
+        if isinstance(start, float) and abs(start - point.gamma) > _FAR:
+            extra += f", from gamma = {start:.7g}"
+    return (
+        point.kind,
+        number(point.gamma, ".8f"),
+        number(point.gamma / math.pi, ".6f"),
+        number(point.moment, ".7f"),
+        number(point.energy, ".7f"),
+        f"  {index:7} {extra}",
+    )
+
+
+def _at_pi(at: AtPi, least: float) -> str:
+    names = {"index": at.index, "moment held": at.index_moment, "grips removed": at.index_free}
+    index = ", ".join(f"{n} {'unknown' if i is None else i}" for n, i in names.items())
+    moment, energy = number(at.moment, ".7g", least), number(at.energy, ".10g", least)
+    return f"at pi: M = {moment}, dM/dgamma = {at.slope:.7g}, U = {energy}; {index}"
+
+
+def _errors(path: Path) -> str:
+    """The largest error bars, and how many states have none."""
+    bars: Mapping[str, Any] = path.error or {}
+    largest = {n: max((e for e in bars[n] if e is not None), default=0.0) for n in _BARS}
+    missing = sum(e is None for e in bars["moment"])
+    none = f"; none at {missing} of {len(path)} states" if missing else ""
+    return f"error bars, at most: {', '.join(f'{n} {e:.1e}' for n, e in largest.items())}{none}"
+
+
+_BARS = ("gamma", "moment", "energy")
