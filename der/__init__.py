@@ -21,10 +21,13 @@ if TYPE_CHECKING:
     from der.analysis.planar.squeeze import squeeze
     from der.bvp.packing import packing_ratio
     from der.bvp.solve import solve_bvp
+    from der.continuation.arclength import follow
+    from der.continuation.events import Events
     from der.diagram.diagram import phase_diagram
     from der.errors import Interrupted, NotConverged
     from der.geometry.ring import Ring, circle, ellipse, profile, rectangle, triangle
     from der.geometry.section import Scale, Section, rectangular_section, section
+    from der.problem import Options
     from der.records.comparison import Comparison
     from der.records.configurations import Shapes
     from der.records.energy_surface import Surface
@@ -33,15 +36,20 @@ if TYPE_CHECKING:
     from der.records.path import Path, Point
     from der.records.planar import PlanarState, PlanarStates, Squeeze, SqueezePoint
     from der.records.states import RingState, States, Transition
+    from der.rod.rod import discrete_rod, straight
+    from der.rod.supports import supported
+    from der.rod.system import RodSystem
     from der.scene import Scene
 
 __all__ = [
     "BarrierCurves",
     "Comparison",
+    "Events",
     "Interrupted",
     "Landscape",
     "LeastPush",
     "NotConverged",
+    "Options",
     "Pass",
     "Path",
     "PlanarState",
@@ -49,6 +57,7 @@ __all__ = [
     "Point",
     "Ring",
     "RingState",
+    "RodSystem",
     "Scale",
     "Scene",
     "Section",
@@ -62,9 +71,11 @@ __all__ = [
     "barrier",
     "circle",
     "compare",
+    "discrete_rod",
     "ellipse",
     "energy_surface",
     "fold",
+    "follow",
     "landscape",
     "least_push",
     "packing_ratio",
@@ -77,11 +88,20 @@ __all__ = [
     "solve_bvp",
     "squeeze",
     "states",
+    "straight",
+    "supported",
     "triangle",
 ]
 
 # where each public name lives
 _HOME = {
+    "follow": ("der.continuation.arclength", "follow"),
+    "Events": ("der.continuation.events", "Events"),
+    "Options": ("der.problem", "Options"),
+    "RodSystem": ("der.rod.system", "RodSystem"),
+    "discrete_rod": ("der.rod.rod", "discrete_rod"),
+    "straight": ("der.rod.rod", "straight"),
+    "supported": ("der.rod.supports", "supported"),
     "compare": ("der.analysis.compare", "compare"),
     "fold": ("der.analysis.fold", "fold"),
     "barrier": ("der.analysis.landscape.barrier", "barrier"),

@@ -47,7 +47,7 @@ def extrema(
     return [
         _extremum(step, a, b, value)
         for a, b in pairwise(_bisected(step, places, value))
-        if value(a[1])[1] * value(b[1])[1] < 0.0
+        if a[0] < b[0] and value(a[1])[1] * value(b[1])[1] < 0.0
     ]
 
 
@@ -78,8 +78,10 @@ def _samples(
     ----------
     off : by how much the rate of the cubic may be wrong; None: not known.
     """
+    if high[0] - low[0] < SAME * step.length:
+        return [low, high]
     rates = _rate(low, high, value)
-    least = least_rate(*rates) if high[0] - low[0] >= SAME * step.length else None
+    least = least_rate(*rates)
     if least is None:
         return [low, high]
     u, expected = least

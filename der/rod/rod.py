@@ -108,24 +108,36 @@ def discrete_rod(
     return Rod(cell, length, mass, strains, np.array(stiffness), stretching, number, bool(closed))
 
 
-def edges(body: Rod, state: State) -> Array:
+def straight(rod: Rod, conditions: int = 0) -> State:
+    """Return the straight state of an open rod along E3, at load 0.
+
+    Parameters
+    ----------
+    conditions : how many position conditions its supports have.
+    """
+    quat = np.zeros((rod.n_edges, 4))
+    quat[:, 0] = 1.0
+    return State(quat, np.zeros(rod.n_edges), np.zeros(conditions), 0.0)
+
+
+def edges(rod: Rod, state: State) -> Array:
     """Edge vectors (n, 3): length times tangent."""
-    lengths = body.length * (1.0 + state.stretch)
+    lengths = rod.length * (1.0 + state.stretch)
     return rotation(state.quat)[:, :, 2] * lengths[:, None]
 
 
-def strains(body: Rod, state: State) -> tuple[Array, Array]:
+def strains(rod: Rod, state: State) -> tuple[Array, Array]:
     """Integrated strains kappa1, kappa2, twist (n_s, 3) [rad] and energies (n_s,) of the vertices.
 
     The energies are those of bending and twisting, in GJ/a.
     """
-    n, n_s = body.n_edges, len(body.cell)
+    n, n_s = rod.n_edges, len(rod.cell)
     kappa, energy = np.empty((n_s, 3)), np.empty(n_s)
     p, g, hess = np.empty(4), np.empty(3), np.empty((3, 3))
     for s in range(n_s):
         relative(state.quat[s], state.quat[(s + 1) % n], p)
         if p[0] < 0.0:
             p *= -1.0
-        stiff = body.stiffness / body.cell[s]
-        energy[s] = vertex_energy(p, body.measure, body.rest[s], stiff, kappa[s], g, hess)
+        stiff = rod.stiffness / rod.cell[s]
+        energy[s] = vertex_energy(p, rod.measure, rod.rest[s], stiff, kappa[s], g, hess)
     return kappa, energy

@@ -56,12 +56,12 @@ def stack(classes: Sequence[SymmetryClass]) -> Stack:
 
 
 @njit(cache=True, inline="always")
-def _class_matrix(rod, held, system, free, weight, axis, quat, stretch, load):
-    """Blocks and border of the Hessian at a state of ``held``, for the modes of one class."""
-    n, b = held.free.shape
+def _class_matrix(rod, supports, system, free, weight, axis, quat, stretch, load):
+    """Blocks and border of the Hessian at a state of ``supports``, for the modes of one class."""
+    n, b = supports.free.shape
     n_c = axis.shape[0]
     border = np.zeros((n, b, n_c))
-    strain = lengthened(rod, held, stretch, load)
+    strain = lengthened(rod, supports, stretch, load)
     position_rows(rod.length, weight, axis, quat, strain, np.zeros(n_c), border)
     return take_out(free, system.diag, system.off, border)
 
@@ -101,20 +101,20 @@ def _stiffness(rod, free, factors):
 
 
 @njit(cache=True)
-def _counts(rod, held, classes, quat, stretch, force, load, shift, looks):
+def _counts(rod, supports, classes, quat, stretch, force, load, shift, looks):
     """Index, how safe it is, and (where ``looks``) the stiffness of the softest mode, (k,) each."""
     k = classes.free.shape[0]
-    n, b = held.free.shape
+    n, b = supports.free.shape
     negative, margin = np.empty(k, dtype=np.int64), np.empty(k)
     stiffness = np.zeros(k)
-    system = assemble(rod, held, quat, stretch, force, load)
+    system = assemble(rod, supports, quat, stretch, force, load)
     for c in range(k):
         m = classes.conditions[c]
         # copies: what they are slices of need not be contiguous, and one kind is compiled
         weight, axis = classes.weight[c, :m].copy(), classes.axis[c, :m].copy()
         free = classes.free[c].copy()
         diag, off, border = _class_matrix(
-            rod, held, system, free, weight, axis, quat, stretch, load
+            rod, supports, system, free, weight, axis, quat, stretch, load
         )
         if shift != 0.0:
             for j in range(n):
@@ -128,60 +128,60 @@ def _counts(rod, held, classes, quat, stretch, force, load, shift, looks):
     return negative, margin, stiffness
 
 
-def index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int | None:
+def index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> int | None:
     """Number of negative eigenvalues among the modes of a class; None where it is uncertain.
 
-    A state of ``held`` at which the smallest pivot is tiny is factored again with a shift of
+    A state of ``supports`` at which the smallest pivot is tiny is factored again with a shift of
     either sign: equal counts certify the index, unequal ones make it None.
     """
-    check_cut(body, modes.free)
-    return _certified(body, held, stack([modes]), state, looks=False)[0][0]
+    check_cut(rod, modes.free)
+    return _certified(rod, supports, stack([modes]), state, looks=False)[0][0]
 
 
 def indices_and_stiffness(
-    body: Rod, held: Supports, classes: Stack, state: State
+    rod: Rod, supports: Supports, classes: Stack, state: State
 ) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
     """`index` of each class, and about how stiff its softest mode is [GJ/a^2], with its sign.
 
     The stiffness is that of `softest_modes`, estimated at little cost: good where it is small.
     """
     for free in classes.free:
-        check_cut(body, free)
-    return _certified(body, held, classes, state, looks=True)
+        check_cut(rod, free)
+    return _certified(rod, supports, classes, state, looks=True)
 
 
 def _certified(
-    body: Rod, held: Supports, classes: Stack, state: State, *, looks: bool
+    rod: Rod, supports: Supports, classes: Stack, state: State, *, looks: bool
 ) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
-    at = (body, held, classes, state.quat, state.stretch, state.force, state.load)
+    at = (rod, supports, classes, state.quat, state.stretch, state.force, state.load)
     negative, margin, stiffness = _counts(*at, 0.0, looks)
     counts: list[int | None] = negative.tolist()
     doubtful = ~((negative >= 0) & (margin > _SAFE))
     if doubtful.any():
-        shift = _SHIFT * float(body.stiffness.max())
+        shift = _SHIFT * float(rod.stiffness.max())
         below, above = (_counts(*at, s, False)[0] for s in (-shift, shift))
         for c in np.flatnonzero(doubtful):
             counts[c] = int(below[c]) if below[c] == above[c] >= 0 else None
     return tuple(counts), tuple(stiffness.tolist())
 
 
-def raw_index(body: Rod, held: Supports, modes: SymmetryClass, state: State) -> int:
+def raw_index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> int:
     """The index by the signs of the pivots alone, as a bisection for its changes needs it."""
-    at = (body, held, stack([modes]), state.quat, state.stretch, state.force, state.load)
+    at = (rod, supports, stack([modes]), state.quat, state.stretch, state.force, state.load)
     return int(_counts(*at, 0.0, False)[0][0])
 
 
-def all_modes(held: Supports) -> SymmetryClass:
+def all_modes(supports: Supports) -> SymmetryClass:
     """Every motion that the supports leave free, as one class."""
-    return SymmetryClass(held.free, held.weight, held.axis)
+    return SymmetryClass(supports.free, supports.weight, supports.axis)
 
 
 @njit(cache=True)
-def _solve_class(rod, held, modes, quat, stretch, force, load, x):
+def _solve_class(rod, supports, modes, quat, stretch, force, load, x):
     """Replace ``x`` (n, b, r) by the displacements under it as forces, on the conditions."""
-    system = assemble(rod, held, quat, stretch, force, load)
+    system = assemble(rod, supports, quat, stretch, force, load)
     diag, off, border = _class_matrix(
-        rod, held, system, modes.free, modes.weight, modes.axis, quat, stretch, load
+        rod, supports, system, modes.free, modes.weight, modes.axis, quat, stretch, load
     )
     n, b, r = x.shape
     m = modes.axis.shape[0]
@@ -198,7 +198,7 @@ def _solve_class(rod, held, modes, quat, stretch, force, load, x):
 
 
 def softest_modes(
-    body: Rod, held: Supports, modes: SymmetryClass, state: State, count: int = 1
+    rod: Rod, supports: Supports, modes: SymmetryClass, state: State, count: int = 1
 ) -> tuple[Array, Array]:
     """Eigenvalues nearest to zero (count,) and their modes (count, n, b).
 
@@ -211,16 +211,16 @@ def softest_modes(
     the eigenvalues, or 30 rounds: enough where these are separated by a factor of two from the
     rest. A mode's error is the square root of its eigenvalue's.
     """
-    check_cut(body, modes.free)
+    check_cut(rod, modes.free)
     n, b = modes.free.shape
     size = min(count + 2, int(modes.free.sum()) - len(modes.axis))
-    root = np.sqrt(np.repeat(body.length, b))[:, None]
+    root = np.sqrt(np.repeat(rod.length, b))[:, None]
     start = np.random.default_rng(0).normal(size=(n * b, size)) * modes.free.reshape(-1, 1)
     z, _ = np.linalg.qr(start)  # modes times sqrt(M), orthonormal
     compliance = np.zeros(size)
     for _ in range(30):
         y = np.ascontiguousarray((root * z).reshape(n, b, size))
-        _solve_class(body, held, modes, state.quat, state.stretch, state.force, state.load, y)
+        _solve_class(rod, supports, modes, state.quat, state.stretch, state.force, state.load, y)
         y = root * y.reshape(n * b, size)
         projected = z.T @ y
         before = compliance[:count]

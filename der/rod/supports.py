@@ -35,7 +35,7 @@ class Supports(NamedTuple):
 
 
 def supported(
-    body: Rod,
+    rod: Rod,
     *,
     clamped: tuple[int, ...] = (),
     held: tuple[tuple[Array, Array, float], ...] = (),
@@ -60,8 +60,8 @@ def supported(
         Where an edge turns that is not clamped: its frame would be both free and prescribed; or
         where one turns that lengthens, too.
     """
-    n = body.n_edges
-    free = np.ones((n, body.block), dtype=bool)
+    n = rod.n_edges
+    free = np.ones((n, rod.block), dtype=bool)
     free[list(clamped)] = False
     rates = np.zeros(n)
     for j, rate in (turn or {}).items():
@@ -88,7 +88,7 @@ def supported(
     )
 
 
-def check_cut(body: Rod, free: NDArray[np.bool_]) -> None:
+def check_cut(rod: Rod, free: NDArray[np.bool_]) -> None:
     """Make sure that a closed rod can be factored as a band.
 
     Raises
@@ -97,5 +97,5 @@ def check_cut(body: Rod, free: NDArray[np.bool_]) -> None:
         Where the frame of its edge 0 is not held, by a grip or to take out rigid rotations: the
         factorisation cuts the cycle there.
     """
-    if body.closed and free[0, :3].any():
+    if rod.closed and free[0, :3].any():
         raise ValueError(f"free must hold the frame of edge 0 of a closed rod, got {free[0]}")

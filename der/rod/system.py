@@ -18,7 +18,7 @@ from der.problem import PARAMETER, PLANE, Increment, Indices
 from der.rod import stability
 from der.rod.equilibrium import DIRECTION_HELD, LOAD_HELD, MOMENT_HELD, Equilibrium, correct
 from der.rod.manifold import difference, product, retract, transport
-from der.rod.rod import Rod, State
+from der.rod.rod import Rod, State, edges
 from der.rod.stability import Stack, SymmetryClass, all_modes, stack
 from der.rod.supports import Supports, check_cut
 
@@ -137,6 +137,11 @@ class RodSystem:
     def inner(self, a: Increment, b: Increment) -> float:
         """Return the inner product, mass-weighted and so independent of the mesh."""
         return float(product(self._weight, a, b))
+
+    def positions(self, state: State) -> Array:
+        """Positions (n + 1, 3) of the ends of the edges, the first at the origin [a]."""
+        steps = edges(self.rod, state)
+        return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
     def indices(
         self, state: State, symmetry: str | None = None

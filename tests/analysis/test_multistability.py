@@ -16,8 +16,8 @@ from der.analysis.multistability.symmetry_images import Images, curvatures, imag
 from der.cli.commands import main
 from der.records.states import RingState, States, Transition
 from der.rod.free_ring import balance
-from der.rod.gripped_ring import free_ring, sector
-from der.rod.rod import rod
+from der.rod.gripped_ring import free_supports, gripped_ring
+from der.rod.rod import discrete_rod
 from der.viz.plots.arrows import arc, bends, label_places
 from der.viz.plots.states import figure_of_states
 from der.viz.plots.style import save_figure
@@ -92,10 +92,10 @@ def wavy(n, seed=3, shift=0.0):
 
 def ways(ring, bar=BAR, n_edges=32, **grips):
     """The images of a ring, free, or in its grips turned to gamma."""
-    whole = sector(ring, bar, n_edges, name="full")
+    full = gripped_ring(ring, bar, n_edges, name="full")
     if "gamma" in grips:
-        return images(whole.body, whole.held, grips["gamma"])
-    return images(whole.body, free_ring(whole.body), 0.0)
+        return images(full.rod, full.supports, grips["gamma"])
+    return images(full.rod, free_supports(full.rod), 0.0)
 
 
 def apart(ways: Images, a, b):
@@ -156,14 +156,14 @@ def test_repeats_are_counted():
 
 def test_curvatures_do_not_change_in_rigid_motions():
     """All frames turned alike."""
-    whole = sector(der.ellipse(0.6), BAR, 32, name="full")
-    state = whole.start
+    full = gripped_ring(der.ellipse(0.6), BAR, 32, name="full")
+    state = full.start
     q = np.array([0.5, -0.1, 0.7, np.sqrt(1.0 - 0.25 - 0.01 - 0.49)])
     a, b = q[0], q[1:]
     p, v = state.quat[:, :1], state.quat[:, 1:]
     turned = np.hstack([a * p - v @ b[:, None], a * v + p * b + np.cross(b, v)])
     np.testing.assert_allclose(
-        curvatures(whole.body, state), curvatures(whole.body, state.but(quat=turned)), atol=1e-13
+        curvatures(full.rod, state), curvatures(full.rod, state.but(quat=turned)), atol=1e-13
     )
 
 
@@ -172,11 +172,11 @@ def test_curvatures_do_not_change_in_rigid_motions():
 
 def test_a_solved_state_is_known_again_wherever_its_material_is():
     """The figure eight, its material moved on by five cells and its frames mirrored."""
-    whole = sector(der.circle(0.5), BAR, 32, name="full")
-    one = solved(eight(whole), ways(der.circle(0.5)))
-    quat = np.roll(one.alone.state.quat, 5, axis=0) * [1.0, 1.0, -1.0, -1.0]
-    again = solved(balance(whole.body, quat, np.zeros(32)), ways(der.circle(0.5)))
-    flat = solved(covered(whole, 1), ways(der.circle(0.5)))
+    full = gripped_ring(der.circle(0.5), BAR, 32, name="full")
+    one = solved(eight(full), ways(der.circle(0.5)))
+    quat = np.roll(one.free.state.quat, 5, axis=0) * [1.0, 1.0, -1.0, -1.0]
+    again = solved(balance(full.rod, quat, np.zeros(32)), ways(der.circle(0.5)))
+    flat = solved(covered(full, 1), ways(der.circle(0.5)))
     assert recognised(again, [flat, one], ways(der.circle(0.5))) == 1
     assert again.energy == pytest.approx(one.energy, abs=1e-11)
 
@@ -184,23 +184,23 @@ def test_a_solved_state_is_known_again_wherever_its_material_is():
 @pytest.mark.parametrize("turns", [1, 2, 3, 4])
 def test_even_covers_need_a_cut(turns):
     """pi_1(SO(3)) has two elements: turns by 2 pi n are one or the other by the parity of n."""
-    whole = sector(der.circle(), BAR, 32, name="full")
-    state = covered(whole, turns).state
+    full = gripped_ring(der.circle(), BAR, 32, name="full")
+    state = covered(full, turns).state
     assert needs_cut(state.quat) is (turns % 2 == 0)
-    assert turning(whole, state) == turns
-    assert turning(whole, covered(whole, turns, math.pi).state) == -turns
+    assert turning(full, state) == turns
+    assert turning(full, covered(full, turns, math.pi).state) == -turns
 
 
 def test_a_round_straight_ring_spins_at_no_cost():
     """Isotropic and naturally straight: the seventh zero mode, and none in the way of the index."""
     n = 32
-    body = rod(np.full(n, 2 * np.pi / n), np.zeros(n), (1.0, 1.0, 1.0), closed=True)
+    rod = discrete_rod(np.full(n, 2 * np.pi / n), np.zeros(n), (1.0, 1.0, 1.0), closed=True)
     angle = np.pi * np.arange(n) / n
     quat = np.stack([np.cos(angle), np.sin(angle), 0 * angle, 0 * angle], axis=1)
-    round_one = balance(body, quat, np.zeros(n))
+    round_one = balance(rod, quat, np.zeros(n))
     assert round_one.zero_modes == 1
     assert round_one.index() == 0
-    flat = rod(np.full(n, 2 * np.pi / n), np.zeros(n), (1.0, 1.5, 1.0), closed=True)
+    flat = discrete_rod(np.full(n, 2 * np.pi / n), np.zeros(n), (1.0, 1.5, 1.0), closed=True)
     assert balance(flat, quat, np.zeros(n)).zero_modes == 0
 
 

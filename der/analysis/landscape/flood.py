@@ -135,10 +135,10 @@ def spread(
     """Fill the grid from states near some of its cells on, until no neighbour is new or Ctrl-C."""
     waiting: deque[tuple[Cell, Equilibrium]] = deque()
     for cell, state in seeds:
-        if not run.pressed:
+        if run.done:
             _try(flood, cell, state, waiting)
     cells = len(flood.gamma) * len(flood.distance)
-    while waiting and not run.pressed:
+    while waiting and run.done:
         cell, at = waiting.popleft()
         for neighbour in flood.neighbours(cell):
             _try(flood, neighbour, at.state, waiting)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import Any
@@ -24,6 +25,7 @@ from der.analysis.landscape.rest_states import with_rests
 from der.analysis.loading import follow_angle
 from der.analysis.request import Request, ring_of
 from der.analysis.snap import Landing
+from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array
 from der.problem import Options, Point, Statistics
 from der.records.energy_surface import NoMinimum, Surface
@@ -108,7 +110,7 @@ def energy_surface(
         )
         spread(flood, _seeds(flood, points), run, progress)
         spread(flood, shaken(flood, _SHAKES), run, progress)
-        snapped = _snaps(ring, request, float(angles[-1])) if snaps and run.done else ()
+        snapped = _snaps(ring, request, float(angles[-1]), run) if snaps and run.done else ()
     folds = line[[k for k, one in enumerate(points) if one.kind == "fold"]]
     return Surface(
         status=run.status,
@@ -209,11 +211,16 @@ def _reasons(flood: Flood, status: str) -> tuple[NoMinimum, ...]:
     )
 
 
-def _snaps(ring: GrippedRing, request: Request, last: float) -> tuple[Array, ...]:
+def _snaps(ring: GrippedRing, request: Request, last: float, run: Run) -> tuple[Array, ...]:
     """Gamma, distance and energy along every snap on the way to the last angle and back."""
     asked = replace(request, gamma_max=last, until_folded=False, targets=())
-    with Run() as run:  # what snapped before it fails or is stopped is kept
-        points = run.collect(follow_angle(ring, asked, Statistics(), unload=True, every=_KEPT))
+    loading = follow_angle(ring, asked, Statistics(), unload=True, every=_KEPT)
+    points: list[Point[Equilibrium]] = []
+    with suppress(ContinuationFailed):  # what snapped before it is kept
+        for point in loading:
+            points.append(point)
+            if not run.done:
+                break
     return tuple(
         _along_snap(ring, before.solution, one)
         for before, one in pairwise(points)
