@@ -38,6 +38,16 @@ class Reason(Enum):
         return self.name.lower()
 
 
+# how the kernels of Newton's method end, by their numbers
+REASONS = (
+    Reason.CONVERGED,
+    Reason.TOO_MANY_ITERATIONS,
+    Reason.DIVERGED,
+    Reason.OUT_OF_RANGE,
+    Reason.SINGULAR,
+)
+
+
 class ContinuationFailed(RuntimeError):
     """A path that cannot be continued.
 

@@ -11,7 +11,7 @@ import pytest
 import der
 from der.kernels.assembly import assemble
 from der.kernels.planar import assemble_planar
-from der.rod.gripped_ring import sector
+from der.rod.gripped_ring import gripped_ring
 from der.rod.planar_ring import covered, planar_ring
 from der.rod.relaxation import relax
 from validation.benchmark.rows import peak_memory
@@ -20,11 +20,11 @@ BARE = {"n_edges": 32, "stability": False, "self_crossings": False, "gamma_max":
 
 # what may be asked for -> who does it, in the module that calls it
 DOERS = {
-    "stability": ({"stability": True}, "der.continuation.events.indices_and_stiffness"),
+    "stability": ({"stability": True}, "der.rod.stability.indices_and_stiffness"),
     "self_crossings": ({"self_crossings": True}, "der.rod.gripped_ring.link"),
     "error bars": ({"error_bars": True}, "der.analysis.error_bars.error_bars"),
     "shapes": ({"shapes": True}, "der.analysis.full_ring.shapes"),
-    "modes": ({"shapes": True, "modes": True}, "der.analysis.full_ring.softest_modes"),
+    "modes": ({"shapes": True, "modes": True}, "der.rod.stability.softest_modes"),
     "relaxation": ({"control": "angle", "solver": "relaxation"}, "der.rod.relaxation._relax"),
 }
 
@@ -98,10 +98,10 @@ def test_frames_are_kept_only_where_they_are_asked_for():
 
 def test_history_is_allocated_only_where_it_is_asked_for():
     """A relaxation reserves room for its configurations, or none."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 16)
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 16)
 
     def rest(every):
-        relax(piece.body, piece.held, piece.start, every=every, most=20_000)
+        relax(ring, ring.start, every=every, most=20_000)
 
     rest(0)
     assert peak_memory(lambda: rest(0)) < 0.1 * peak_memory(lambda: rest(1))
@@ -110,16 +110,16 @@ def test_history_is_allocated_only_where_it_is_asked_for():
 @pytest.mark.parametrize(("stretching", "block"), [(0.0, 3), (1e4, 4)])
 def test_stretch_takes_unknowns_only_where_it_is_finite(stretching, block):
     """Three unknowns an edge, and four where the edges stretch: blocks of that size."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 16, stretching=stretching)
-    state = piece.start
-    system = assemble(piece.body, piece.held, state.quat, state.stretch, state.force, state.load)
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 16, stretching=stretching)
+    state = ring.start
+    system = assemble(ring.rod, ring.supports, state.quat, state.stretch, state.force, state.load)
     assert system.diag.shape[1:] == (block, block)
     assert len(system.diag) < 8  # of a quarter, not of the ring
 
 
 OPTIONAL = (
     "der.analysis.error_bars",
-    "der.analysis.matching",
+    "der.analysis.extrapolated_curve",
     "der.analysis.loading",
     "der.analysis.snap",
     "der.rod.relaxation",
@@ -138,7 +138,7 @@ NEEDED = {
     "": set(),
     "error_bars=True, shapes=True": {
         "der.analysis.error_bars",
-        "der.analysis.matching",
+        "der.analysis.extrapolated_curve",
         "der.analysis.full_ring",
     },
     "control='angle'": {"der.analysis.loading", "der.analysis.snap", "der.rod.relaxation"},
@@ -186,14 +186,14 @@ def test_a_planar_scene_knows_nothing_of_space(work, area):
 
 def test_a_planar_scene_allocates_one_unknown_an_edge():
     """What it asks for at most is less than half of what the rod in space does, at equal edges."""
-    piece = sector(der.circle(), der.rectangular_section(4.0), 1024, name="full")
-    state = piece.start
+    in_grips = gripped_ring(der.circle(), der.rectangular_section(4.0), 1024, name="full")
+    state = in_grips.start
     given = (state.quat, state.stretch, state.force, state.load)
-    ring = planar_ring(der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=1024))
-    rod, phi = ring.rod(1), covered(ring, 1)
+    in_its_plane = planar_ring(der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=1024))
+    rod, phi = in_its_plane.rod(1), covered(in_its_plane, 1)
 
     def in_space():
-        assemble(piece.body, piece.held, *given)
+        assemble(in_grips.rod, in_grips.supports, *given)
 
     def in_plane():
         assemble_planar(rod, phi, np.zeros(2), 0.0)

@@ -82,6 +82,13 @@ def error_bars(
     end = _end(rings[-1], request, max_steps=4 * len(points) + 100)
     if end != points[-1].solution.parameter:
         return _without_errors(rings, points, end)
+    return _extrapolated(rings, request, points)
+
+
+def _extrapolated(
+    rings: Sequence[GrippedRing], request: Request, points: Sequence[Point[Equilibrium]]
+) -> ErrorBars:
+    """The same of a path of which the coarsest mesh may not reach the end."""
     asked = _asked(request, points)
     family = Family(tuple(rings), request.tolerance)
     points = all_asked(family, request, points, asked)

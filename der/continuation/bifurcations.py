@@ -158,7 +158,7 @@ def is_fold(step: Step[Any], s: float) -> bool:
     rate_a, rate_b = (at.observables[step.system.conjugate][1] for at in (a, b))
     # dparameter/dconjugate at both, times the same
     first, last = a.parameter_rate * rate_b, b.parameter_rate * rate_a
-    if first == last:
+    if first == last or rate_a * rate_b <= 0.0:  # a pole, as on a path that crosses another
         return False
     return abs(low - first * (high - low) / (last - first) - s) < _AT * _NEXT
 

@@ -23,6 +23,7 @@ from typing import Any, Generic, NamedTuple, Protocol
 from der.continuation.bifurcations import Change, Counting, is_fold, merged, own_changes
 from der.continuation.extrema import Found, extrema, of_observable, of_parameter
 from der.continuation.step import SAME, Step
+from der.errors import ContinuationFailed, Reason
 from der.problem import Indices, Point, S, Solution, Stability, System
 
 _FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
@@ -186,6 +187,8 @@ class _Stability:
             found += self._changes(a, b, [m for m in folds if a.s < m.s < b.s])
         # two folds within a step that its cubic did not show
         hidden = [Mark(one.s, Point(one.at, "fold")) for one in found if one.fold]
+        if len(hidden) % 2:  # of one curve there are two, or none
+            raise ContinuationFailed(Reason.OTHER_BRANCH.value, Reason.OTHER_BRANCH)
         others = [one for one in found if not one.fold]
         branches = [
             Mark(

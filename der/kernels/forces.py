@@ -13,7 +13,6 @@ from numba import njit
 from der.kernels.assembly import lengthened, position_rows
 from der.kernels.quaternions import Array, into_frame, relative
 from der.kernels.strain import vertex_energy
-from der.rod.supports import Supports
 
 _BENT_TOO_FAR = 0.0301537  # cos(80 deg)^2, as in assembly.py
 
@@ -42,22 +41,6 @@ class Pull(NamedTuple):
     metric: Array  # (m, m) Cholesky factor of B' M^-1 B
     force: Array  # (m,) multipliers of the conditions
     work: Array  # (1,) of the dead load
-
-
-def no_pull(held: Supports) -> Pull:
-    """Room for the forces on a rod."""
-    (n, b), m = held.free.shape, len(held.target)
-    return Pull(
-        grad=np.zeros((n, b)),
-        load_grad=np.zeros(1),
-        gap=np.zeros(m),
-        border=np.zeros((n, b, m)),
-        load_border=np.zeros(m),
-        lever=np.zeros((n, b, m)),
-        metric=np.zeros((m, m)),
-        force=np.zeros(m),
-        work=np.zeros(1),
-    )
 
 
 @njit(cache=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from der.errors import Reason
+from der.errors import REASONS
 from der.kernels.assembly import assemble, hold
 from der.kernels.block_ldl import factor, inertia, solve_refined
 from der.problem import Increment, Solution
@@ -25,15 +25,8 @@ from der.rod.supports import Supports
 _CLOSE = 1e-2
 _LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the path
 
-# what closes the equations, and how the kernel ends
+# what closes the equations
 LOAD_HELD, DIRECTION_HELD, MOMENT_HELD = range(3)
-REASONS = (
-    Reason.CONVERGED,
-    Reason.TOO_MANY_ITERATIONS,
-    Reason.DIVERGED,
-    Reason.OUT_OF_RANGE,
-    Reason.SINGULAR,
-)
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from der.errors import Reason
+from der.errors import REASONS, Reason
 from der.kernels.assembly import assemble, take_out
 from der.kernels.block_ldl import factor, inertia, solve_refined
 from der.kernels.quaternions import Array, into_frame, rotation_vector, turned
-from der.rod.equilibrium import REASONS
 from der.rod.rod import Rod, State
 from der.rod.supports import Supports, check_cut
 

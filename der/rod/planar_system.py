@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from der.errors import REASONS
 from der.kernels.planar import Array, PlanarRod, correct_planar, negative_planar
 from der.problem import PARAMETER, PLANE, Increment, Indices, Solution
-from der.rod.equilibrium import REASONS
 
 
 class PlanarConfiguration(NamedTuple):

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from der.kernels.forces import Motion, clear, conditions, gradient, no_pull
+from der.kernels.forces import Motion, Pull, clear, conditions, gradient
 from der.kernels.masses import Masses, condition_metric, solve_metric, weigh
 from der.kernels.quaternions import Array, into_frame, turned
 from der.problem import Increment
@@ -328,6 +328,22 @@ def _at_rest(supports: Supports, state: State) -> Motion:
     )
 
 
+def _no_pull(supports: Supports) -> Pull:
+    """Room for the forces on a rod."""
+    (n, b), m = supports.free.shape, len(supports.target)
+    return Pull(
+        grad=np.zeros((n, b)),
+        load_grad=np.zeros(1),
+        gap=np.zeros(m),
+        border=np.zeros((n, b, m)),
+        load_border=np.zeros(m),
+        lever=np.zeros((n, b, m)),
+        metric=np.zeros((m, m)),
+        force=np.zeros(m),
+        work=np.zeros(1),
+    )
+
+
 def relax(
     system: RodSystem,
     start: State,
@@ -369,7 +385,7 @@ def relax(
     if kick is not None:
         start = system.retract(start, kick)
     n, b = supports.free.shape
-    motion, pull = _at_rest(supports, start), no_pull(supports)
+    motion, pull = _at_rest(supports, start), _no_pull(supports)
     masses = Masses(np.zeros((n, b, b)), np.zeros((n, b, b)), np.zeros(1))
     slots = min(most // every + 1, _SLOTS) if every > 0 else 0
     album = Album(np.empty((slots, n, 4)), np.empty((slots, n)), np.empty(slots), np.empty(slots))

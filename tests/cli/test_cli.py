@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-from functools import partial
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path as File
 
@@ -16,7 +16,8 @@ import pytest
 
 import der
 import der.analysis.fold
-import der.continuation.arclength
+import der.analysis.landscape.opening
+from der.analysis.request import Request
 from der.cli.commands import main
 from der.records.configurations import Shapes
 from der.records.path import Path
@@ -608,25 +609,35 @@ def test_without_words_there_is_help(run):
 # --- When things go wrong --------------------------------------------------------------------
 
 
+def follow_with(monkeypatch, **options):
+    """Paths are followed with other options."""
+    usual = der.analysis.fold._request
+
+    def request(scene):
+        asked = usual(scene)
+        return replace(asked, options=replace(asked.options, **options))
+
+    monkeypatch.setattr(der.analysis.fold, "_request", request)
+
+
 @pytest.fixture
 def stuck(monkeypatch):
     """Paths stop after six steps."""
-    few = partial(der.analysis.fold.Wanted, most_steps=6)
-    monkeypatch.setattr(der.analysis.fold, "Wanted", few)
+    follow_with(monkeypatch, max_steps=6)
 
 
 @pytest.fixture
 def interrupted(monkeypatch):
     """The user presses Ctrl-C after the fifth state."""
-    follow = der.analysis.fold.follow
+    usual = der.analysis.fold._points
 
-    def follow_a_while(*arguments):
-        for k, visit in enumerate(follow(*arguments)):
+    def points(*arguments):
+        for k, point in enumerate(usual(*arguments)):
             if k == 5:
                 signal.raise_signal(signal.SIGINT)
-            yield visit
+            yield point
 
-    monkeypatch.setattr(der.analysis.fold, "follow", follow_a_while)
+    monkeypatch.setattr(der.analysis.fold, "_points", points)
 
 
 def full(*_):
@@ -694,7 +705,7 @@ def test_an_unfinished_path_fills_its_folder(run):
 
 def test_where_newton_fails_the_flat_state_is_saved(run, monkeypatch):
     """No step forward at all: one state is on record, and the reason names the place."""
-    monkeypatch.setattr(der.continuation.arclength, "SMALLEST_STEP", 10.0)
+    follow_with(monkeypatch, smallest_step=10.0)
     code, _, err = run(*SMALL, "--quiet", "--json", "f.json")
     assert code == 3
     assert "no step forward from gamma = 0" in err[0]
@@ -922,16 +933,14 @@ def test_ctrl_c_while_files_are_written_keeps_the_record(run, monkeypatch, named
 @pytest.mark.parametrize("kind", [(), ("--push",)])
 def test_an_interrupted_landscape_names_its_file(run, monkeypatch, kind):
     """As states do."""
-    home = "der.analysis.landscape.opening" if kind else "der.analysis.landscape.landscape"
-    module = __import__(home, fromlist=["x"])
-    name = "scan" if kind else "follow"
-    real = getattr(module, name)
+    home, name = (der.analysis.landscape.opening, "scan") if kind else (Request, "follow")
+    real = getattr(home, name)
 
     def pressed(*arguments):
         signal.raise_signal(signal.SIGINT)
         return [] if kind else real(*arguments)
 
-    monkeypatch.setattr(module, name, pressed)
+    monkeypatch.setattr(home, name, pressed)
     words = ("landscape", "circle", "--h-over-t", "4", "--edges", "32", "--quiet", *kind)
     code, out, err = run(*words)
     assert (code, out, len(err)) == (130, "", 1)

@@ -72,7 +72,7 @@ def test_moving_a_state_leaves_it_as_it_was():
 
 @pytest.mark.parametrize("kept", range(4))
 def test_interpolant_has_values_and_rates_of_its_cubic_and_leads_through_solutions(kept):
-    """Zero, the jump and both rates at its ends whatever is kept, and every solution that is kept."""
+    """Zero, the jump and both rates at its ends whatever is kept, and every solution kept."""
     ring, length = half(), 0.4
     rate, jump, end_rate = (increment(ring, seed) for seed in (5, 6, 7))
     curve = Interpolant(length, rate, jump, end_rate)
@@ -105,7 +105,7 @@ def test_interpolant_keeps_no_solutions_that_lie_close_to_others():
 
 
 def test_polynomials_of_degree_six_are_followed_exactly():
-    """A cubic and three solutions determine it: what is added vanishes with its rate at both ends."""
+    """A cubic and three solutions determine it: what is added vanishes with its rate at the ends."""
     length, places = 2.0, np.array([0.25, 0.5, 0.75])
     p = np.polynomial.Polynomial([0.0, 1.0, -2.0, 0.5, 3.0, -1.0, 0.7])
     cubic = [p.deriv()(0.0), p(length), p.deriv()(length)]

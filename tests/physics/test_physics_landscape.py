@@ -11,14 +11,15 @@ from shapes import scene
 
 import der
 from der.analysis.landscape.barrier import barrier
-from der.analysis.landscape.landscape import landscape, scene_sector
+from der.analysis.landscape.landscape import FARTHEST, landscape
 from der.analysis.landscape.over_thickness import barriers_over
+from der.analysis.landscape.rest_states import with_rests
 from der.analysis.landscape.saddle_search import climb, downhill_modes
 from der.analysis.landscape.surface import energy_surface
-from der.rod.equilibrium import Direction
-from der.rod.free_ring import left_alone, shift
+from der.analysis.request import Request, ring_of
+from der.problem import Statistics
+from der.rod.free_ring import released, shift
 from der.rod.relaxation import relax
-from der.rod.stability import all_modes, softest_modes
 
 SHAPES = [
     (der.circle(), 4.0),
@@ -35,7 +36,7 @@ def along(ring, h_over_t, **numerics):
 
 
 @functools.cache
-def alone(ring, h_over_t, n_edges=64):
+def without_grips(ring, h_over_t, n_edges=64):
     return barrier(scene(ring, h_over_t, n_edges=n_edges))
 
 
@@ -44,29 +45,21 @@ def sheet(ring, h_over_t, n):
     return energy_surface(scene(ring, h_over_t), shape=(n, n))
 
 
-def rest_left_alone(ring, h_over_t, which):
+def rest_released(ring, h_over_t, which):
     """A rest of the twisting path, and the same configuration without grips."""
     one = along(ring, h_over_t)
     rest = one.rests[which]
     asked = scene(ring, h_over_t)
-    piece, whole = scene_sector(asked, "auto"), scene_sector(asked, "full")
-    state = _state_at(asked, piece, rest)
-    return rest, left_alone(piece, whole, state), whole
+    sector, full = ring_of(asked), ring_of(asked, "full")
+    return rest, released(sector, full, _state_at(sector, rest)), full
 
 
-def _state_at(asked, piece, rest):
+def _state_at(sector, rest):
     """The state of a rest, from the path once more."""
-    from der.analysis.landscape.landscape import FARTHEST
-    from der.analysis.landscape.rest_states import with_rests
-    from der.continuation.arclength import follow
-    from der.continuation.events import Wanted
-    from der.continuation.step import Tally
-
-    wanted = Wanted(load_max=FARTHEST, until_folded=True, stability=False, contacts=False)
-    tally = Tally()
-    visits, at = with_rests(piece, wanted, list(follow(piece, wanted, tally)), tally)
-    nearest = min(at, key=lambda k: abs(visits[k].at.state.load - rest.gamma))
-    return visits[nearest].at.state
+    request = Request(FARTHEST, until_folded=True, stability=False, self_crossings=False)
+    points, at = with_rests(sector, request, list(request.follow(sector)), Statistics())
+    nearest = min(at, key=lambda k: abs(points[k].solution.parameter - rest.gamma))
+    return points[nearest].solution.state
 
 
 # --- along the path ---------------------------------------------------------------------------
@@ -200,56 +193,55 @@ def test_the_barrier_to_open_exists_above_the_threshold_only_and_grows():
     assert np.all(np.diff(curves.open[curves.h_over_t > 3.5]) > 0.0)
 
 
-# --- left alone -------------------------------------------------------------------------------
+# --- without grips ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("ring", "h_over_t"), SHAPES, ids=str)
-def test_every_rest_is_an_equilibrium_of_the_ring_left_alone(ring, h_over_t):
+def test_every_rest_is_an_equilibrium_of_the_free_ring(ring, h_over_t):
     """At M = 0 the grips exert nothing, bending moments included: the half-turn about the axis.
 
     Residual of the full ring without grips, in units of its largest bending stiffness.
     """
     for which in range(3):
-        _, free, whole = rest_left_alone(ring, h_over_t, which)
-        stiffest = float(whole.body.stiffness.max() / whole.body.cell.min())
+        _, free, full = rest_released(ring, h_over_t, which)
+        stiffest = float(full.rod.stiffness.max() / full.rod.cell.min())
         assert free.residual < 1e-12 * stiffest
 
 
 @pytest.mark.parametrize(("ring", "h_over_t", "ways"), [(*SHAPES[0], 1), (*SHAPES[1], 2)], ids=str)
-def test_index_left_alone_by_dense_eigenvalues(ring, h_over_t, ways):
+def test_index_without_grips_by_dense_eigenvalues(ring, h_over_t, ways):
     """Truth: eigenvalues of the dense Hessian; a circle has one more of 0, the material shift.
 
     Factored with that shift pinned the index is certified; the shift's rates are its null vector.
     """
-    rest, free, _ = rest_left_alone(ring, h_over_t, 1)
-    values = on_conditions(*dense(free.body, free.held, free.state))
+    rest, free, _ = rest_released(ring, h_over_t, 1)
+    values = on_conditions(*dense(free.unpinned, free.state))
     zero = int(np.sum(np.abs(values) < 1e-10))
     assert zero == free.zero_modes == int(ring.shape == "circle")
     assert int(np.sum(values < -1e-10)) == free.index() == rest.index_free == ways
     if zero:
-        modes = all_modes(free.held)
-        _, (mode,) = softest_modes(free.body, free.held, modes, free.state)
-        rates = shift(free.body, free.state)
+        _, (mode,) = free.unpinned.softest_modes(free.state)
+        rates = shift(free.rod, free.state)
         cosine = abs(np.vdot(mode, rates)) / np.linalg.norm(mode) / np.linalg.norm(rates)
         assert cosine == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("h_over_t", [3.6, 8.0])
-def test_the_saddle_of_a_circle_is_the_same_in_grips_and_alone(h_over_t):
+def test_the_saddle_of_a_circle_is_the_same_in_grips_and_without(h_over_t):
     """Index 1 without grips, material shift taken out: barriers of twisting are the ring's own."""
-    found = alone(der.circle(), h_over_t)
+    found = without_grips(der.circle(), h_over_t)
     assert found.saddle.twisted
     assert found.saddle.index == found.saddle.zero_modes == 1
     assert found.saddle.residual < 1e-9
     assert found.open == pytest.approx(found.twisting.open, abs=1e-12)
 
 
-def test_an_ellipse_left_alone_opens_far_more_easily():
+def test_an_ellipse_without_grips_opens_far_more_easily():
     """b/a = 0.6, h/t = 4: 0.0107 GJ/a beside 0.671 by twisting, of order 2 in the cell.
 
     The saddle of twisting has two ways down; beside it is one of index 1, residual below 1e-9.
     """
-    ones = [alone(der.ellipse(0.6), 4.0, n) for n in (32, 64, 128)]
+    ones = [without_grips(der.ellipse(0.6), 4.0, n) for n in (32, 64, 128)]
     for one in ones:
         assert not one.saddle.twisted
         assert one.saddle.index == 1
@@ -262,11 +254,11 @@ def test_an_ellipse_left_alone_opens_far_more_easily():
 
 
 def test_twisting_about_either_axis_leads_to_one_free_saddle():
-    """Ellipse b/a = 0.85: what is left alone knows no axis. From two meshes, to their rounding.
+    """Ellipse b/a = 0.85: the free ring knows no axis. From two meshes, to their rounding.
 
     The saddle of twisting is the same about either axis as well, with two ways down.
     """
-    about_x, about_y = (alone(der.ellipse(0.85, axis), 4.0) for axis in "xy")
+    about_x, about_y = (without_grips(der.ellipse(0.85, axis), 4.0) for axis in "xy")
     assert about_x.open == pytest.approx(about_y.open, abs=1e-9)
     assert about_x.twisting.open == pytest.approx(about_y.twisting.open, abs=1e-9)
     assert about_x.open < 0.5 * about_x.twisting.open
@@ -275,7 +267,7 @@ def test_twisting_about_either_axis_leads_to_one_free_saddle():
 @pytest.mark.parametrize("h_over_t", [4.0, 30.0])
 def test_a_free_saddle_leads_to_flat_and_to_folded(h_over_t):
     """The energy rises from flat to the saddle and falls to the folded ring, at every step."""
-    found = alone(der.ellipse(0.6), h_over_t)
+    found = without_grips(der.ellipse(0.6), h_over_t)
     assert set(found.saddle.ends) == {"flat", "folded"}
     energy = found.way[:, 1]
     top = int(np.argmax(energy))
@@ -291,31 +283,30 @@ def test_climbs_from_both_sides_meet_in_one_saddle():
     Dynamic relaxation, which knows no Hessian, leads from there to flat and to folded.
     """
     ring = der.ellipse(0.6)
-    _, saddle, _ = rest_left_alone(ring, 4.0, 1)
-    _, folded, _ = rest_left_alone(ring, 4.0, 2)
+    _, saddle, _ = rest_released(ring, 4.0, 1)
+    _, folded, _ = rest_released(ring, 4.0, 2)
     size = 0.05 * math.sqrt(ring.length)
     along_it, aside = downhill_modes(saddle)
     down = climb(saddle, along_it, kick=size * aside)
-    held = folded.pinned()
-    _, (soft,) = softest_modes(folded.body, held, all_modes(held), folded.state)
+    _, (soft,) = folded.system.softest_modes(folded.state)
     up = climb(folded, soft, kick=size * soft)
     assert down.is_saddle
     assert up.is_saddle
-    assert down.at.energy == pytest.approx(up.at.energy, abs=1e-10)
-    (way,) = downhill_modes(down.alone)
+    assert down.solution.energy == pytest.approx(up.solution.energy, abs=1e-10)
+    (mode,) = downhill_modes(down.free)
+    free = down.free.unpinned
     ends = []
     for sign in (1.0, -1.0):
-        kick = Direction(sign * size * way, np.zeros(3), 0.0)
-        rest = relax(down.alone.body, down.alone.held, down.alone.state, kick=kick)
+        rest = relax(free, down.free.state, kick=free.increment(sign * size * mode))
         assert rest.rests
         ends.append(rest.energy)
     wells = [one.energy for one in along(ring, 4.0).wells]
     assert sorted(ends) == pytest.approx(wells, abs=1e-6)
 
 
-def test_a_ring_that_is_no_well_left_alone_has_no_barrier():
+def test_a_ring_that_is_no_well_without_grips_has_no_barrier():
     """Ellipse b/a = 0.6 at h/t = 3: a well in grips, index 1 without; null, and a sentence."""
-    found = alone(der.ellipse(0.6), 3.0)
+    found = without_grips(der.ellipse(0.6), 3.0)
     assert found.fold is None
     assert found.open is None
     assert "no well" in found.why

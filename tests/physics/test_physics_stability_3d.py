@@ -14,14 +14,12 @@ from rods import dense, lifted, on_conditions, richardson
 from shapes import scene
 
 import der
-from der.continuation.arclength import follow
-from der.continuation.events import Wanted
-from der.continuation.step import Tally
-from der.rod.equilibrium import Direction, equilibrium
-from der.rod.gripped_ring import free_ring, sector
+from der.analysis.request import Request
+from der.problem import total_index
+from der.rod.gripped_ring import free_supports, gripped_ring
 from der.rod.relaxation import relax
 from der.rod.rod import State
-from der.rod.stability import all_modes, index, softest_modes
+from der.rod.system import RodSystem
 from scenarios.folded_stability import Folded, threshold, thresholds
 
 SIXTY = der.triangle(math.radians(60), 1 / 30)
@@ -52,24 +50,19 @@ def test_index_with_the_moment_held(ring, h_over_t):
 
     Truth: the dense Hessian of the full ring, on 32 edges, gamma an unknown in one of the two.
     """
-    piece, full = (
-        sector(ring, der.rectangular_section(h_over_t), 32, name=name) for name in ("auto", "full")
-    )
+    section = der.rectangular_section(h_over_t)
+    sector, full = (gripped_ring(ring, section, 32, name=name) for name in ("auto", "full"))
     seen = 0
-    for one in follow(piece, Wanted(contacts=False), Tally()):
+    for one in Request(self_crossings=False).follow(sector):
         if one.kind:  # singular
             continue
-        counted = sum(
-            times * count
-            for (times, _), count in zip(piece.classes.values(), one.index, strict=True)
-        )
-        at = lifted(piece, one.at.state, full)
+        at = lifted(sector, one.solution.state, full)
         held, free = (
-            int(np.sum(on_conditions(*dense(full.body, full.held, at.state, load_free=free)) < 0))
+            int(np.sum(on_conditions(*dense(full, at.state, load_free=free)) < 0))
             for free in (False, True)
         )
-        assert counted == held
-        assert free == held + (one.at.slope < 0.0)
+        assert total_index(sector, one.index) == held
+        assert free == held + (one.solution.slope < 0.0)
         seen += 1
     assert seen > 15
 
@@ -100,7 +93,7 @@ def test_the_index_changes_by_one_at_a_fold(ring, h_over_t):
         assert abs(point.index_after - point.index_before) == by
 
 
-# --- folded rings, left alone -------------------------------------------------------------------
+# --- folded rings, without grips ----------------------------------------------------------------
 
 
 def test_thresholds_of_the_free_three_covered_circle():
@@ -177,7 +170,7 @@ def test_slopes_about_both_axes_vanish_together(shape, b):
     """dM/dgamma = 0 at one h/t about x and y: then a mode of full symmetry has no stiffness.
 
     At M = 0 and slope 0 the grips push in no way, to first order, so the neighbouring state is one
-    of the ring left alone; twisted about either axis it has the same symmetry. To the bisection.
+    of the free ring; twisted about either axis it has the same symmetry. To the bisection.
     """
     at = []
     for axis in "xy":
@@ -187,7 +180,7 @@ def test_slopes_about_both_axes_vanish_together(shape, b):
     assert at[0] == pytest.approx(at[1], rel=1e-6)
 
 
-def test_an_ellipse_that_the_slope_calls_stable_is_not_when_left_alone():
+def test_an_ellipse_that_the_slope_calls_stable_is_not_without_grips():
     """b/a = 0.6: the slope is positive above h/t = 2.195, the free ring a minimum above 3.63 only.
 
     The order is 2. Under a moment the index follows the slope.
@@ -204,8 +197,8 @@ def test_an_ellipse_that_the_slope_calls_stable_is_not_when_left_alone():
     [(der.ellipse(0.6), 3.0, -0.10951), (OBTUSE, 4.0, -1.7905)],
     ids=str,
 )
-def test_the_way_down_converges(ring, h_over_t, softest):
-    """The stiffness of the mode that unfolds a ring left alone, from 64, 128 and 256 edges.
+def test_the_unstable_mode_converges(ring, h_over_t, softest):
+    """The stiffness of the mode that unfolds a free ring, from 64, 128 and 256 edges.
 
     Of order 2; extrapolated to 2e-4 of what the next pair gives.
     """
@@ -221,39 +214,38 @@ def test_the_way_down_converges(ring, h_over_t, softest):
 
 @pytest.mark.parametrize(("ring", "h_over_t"), [(der.ellipse(0.6), 3.0), (OBTUSE, 4.0)], ids=str)
 @pytest.mark.parametrize("a_over_t", [50.0, 200.0])
-def test_stretch_leaves_the_way_down(ring, h_over_t, a_over_t):
+def test_stretch_keeps_the_unstable_mode(ring, h_over_t, a_over_t):
     """With edges that stretch, one more unknown each and no constraint, the free index is 1, too.
 
     The state is solved for anew, free of grips.
     """
     section = der.rectangular_section(h_over_t)
     stretching = 12.0 * section.alpha * a_over_t**2
-    whole = sector(ring, section, 64, name="full", stretching=stretching)
+    full = gripped_ring(ring, section, 64, name="full", stretching=stretching)
     stiff, start = Folded.of(ring, 64, h_over_t).alone(h_over_t)
-    assert index(stiff.body, free_ring(stiff.body), all_modes(free_ring(stiff.body)), start) == 1
-    held = free_ring(whole.body)
-    at = equilibrium(whole.body, held, start)
+    assert stiff.index(start) == 1
+    free = RodSystem(full.rod, free_supports(full.rod))
+    at = free.correct(start)
     assert at.converged
-    assert index(whole.body, held, all_modes(held), at.state) == 1
+    assert free.index(at.state) == 1
 
 
 @pytest.mark.parametrize(("ring", "h_over_t"), [(der.ellipse(0.6), 3.0), (OBTUSE, 4.0)], ids=str)
-def test_a_ring_left_alone_unfolds_to_flat(ring, h_over_t):
-    """Kicked by 0.02 rad along either sign of the way down it comes to rest flat, U = 0.
+def test_a_free_ring_unfolds_to_flat(ring, h_over_t):
+    """Kicked by 0.02 rad along either sign of the unstable mode it comes to rest flat, U = 0.
 
     Dynamic relaxation knows no Hessian. Above the free threshold a kick along the softest mode
     decays instead.
     """
     for above in (False, True):
         h = 8.0 if above else h_over_t
-        whole, state = Folded.of(ring, 64).alone(h)
-        held = free_ring(whole.body)
-        at = equilibrium(whole.body, held, state)
-        stiffness, modes = softest_modes(whole.body, held, all_modes(held), state, 3)
+        free, state = Folded.of(ring, 64).alone(h)
+        at = free.correct(state)
+        stiffness, modes = free.softest_modes(state, 3)
         mode = modes[int(np.argmin(stiffness))]
         for sign in (1.0, -1.0):
-            kick = Direction(sign * 0.02 * mode * math.sqrt(ring.length), np.zeros(3), 0.0)
-            rest = relax(whole.body, held, state, kick=kick)
+            kick = free.increment(sign * 0.02 * mode * math.sqrt(ring.length))
+            rest = relax(free, state, kick=kick)
             assert rest.rests
             assert rest.energy == pytest.approx(at.energy if above else 0.0, abs=1e-5)
 
@@ -274,17 +266,16 @@ def test_a_narrow_stadium_loses_its_symmetry_before_it_is_folded():
     order = math.log2((places[0] - places[1]) / (places[1] - places[2]))
     assert order == pytest.approx(2.0, abs=0.05)
     assert richardson(*places) == pytest.approx(2.96705, abs=2e-5)
-    piece, at = Folded.of(STADIUM, 64).gripped(1.5, "full")
-    modes = all_modes(piece.held)
-    stiffness, ways = softest_modes(piece.body, piece.held, modes, at.state, 2)
+    full, at = Folded.of(STADIUM, 64).gripped(1.5, "full")
+    stiffness, modes = full.softest_modes(at.state, 2)
     assert stiffness[0] == pytest.approx(stiffness[1], rel=1e-6)
     assert stiffness[0] < 0.0
-    kick = Direction(0.05 * ways[0] * math.sqrt(STADIUM.length), 0.0 * at.state.force, 0.0)
-    rest = relax(piece.body, piece.held, at.state, kick=kick)
+    kick = full.increment(0.05 * modes[0] * math.sqrt(STADIUM.length))
+    rest = relax(full, at.state, kick=kick)
     assert rest.rests
     assert rest.energy < at.energy - 0.01
-    after = equilibrium(piece.body, piece.held, rest.state)
-    assert index(piece.body, piece.held, modes, after.state) == 0
+    after = full.correct(rest.state)
+    assert full.index(after.state) == 0
 
 
 @pytest.mark.parametrize(
@@ -334,19 +325,17 @@ def test_where_a_ring_goes_that_loses_its_symmetry(ring, h_over_t, folded_energy
     """
     energies = []
     for n_edges in (64, 128):
-        piece, at = Folded.of(ring, n_edges).gripped(h_over_t, "full")
-        modes = all_modes(piece.held)
+        full, at = Folded.of(ring, n_edges).gripped(h_over_t, "full")
         assert at.energy == pytest.approx(folded_energy, abs=1e-5)
-        stiffness, ways = softest_modes(piece.body, piece.held, modes, at.state, 2)
+        stiffness, modes = full.softest_modes(at.state, 2)
         assert stiffness[0] == pytest.approx(stiffness[1], rel=1e-6)
         ends = []
         for sign in (1.0, -1.0):
-            way = (ways[0] + sign * ways[1]) * math.sqrt(0.5 * ring.length)
-            kick = Direction(0.05 * way, 0.0 * at.state.force, 0.0)
-            rest = relax(piece.body, piece.held, at.state, kick=kick)
-            after = equilibrium(piece.body, piece.held, rest.state)
+            mode = (modes[0] + sign * modes[1]) * math.sqrt(0.5 * ring.length)
+            rest = relax(full, at.state, kick=full.increment(0.05 * mode))
+            after = full.correct(rest.state)
             assert rest.rests
-            if index(piece.body, piece.held, modes, after.state) == 0:
+            if full.index(after.state) == 0:
                 ends.append(after.energy)
         assert len(ends) > 0
         assert ends == pytest.approx([ends[0]] * len(ends), abs=1e-8)
@@ -361,13 +350,13 @@ def planar_least(ring, section, n_edges):
     """The planar three-covered shape of least bending energy, as an equilibrium in the grips."""
     from der.bvp.folded_shape import bent_by_force
 
-    piece = sector(ring, section, n_edges)
-    a = 0.5 * (bent_by_force(ring).angle(piece.arc_length) - 0.5 * np.pi)
+    gripped = gripped_ring(ring, section, n_edges)
+    a = 0.5 * (bent_by_force(ring).angle(gripped.arc_length) - 0.5 * np.pi)
     quat = np.stack([0.0 * a, 0.0 * a, np.sin(a), np.cos(a)], axis=1)
-    start = State(quat, np.zeros(len(a)), np.zeros(len(piece.held.target)), math.pi)
-    at = equilibrium(piece.body, piece.held, start, iterations=30)
+    start = State(quat, np.zeros(len(a)), np.zeros(len(gripped.supports.target)), math.pi)
+    at = gripped.correct(start, iterations=30)
     assert at.converged
-    return Folded(ring, n_edges, section.alpha, at.state), piece.copies * at.energy
+    return Folded(ring, n_edges, section.alpha, at.state), gripped.copies * at.energy
 
 
 @pytest.mark.parametrize(
@@ -377,7 +366,7 @@ def test_the_folded_triangle_is_not_always_the_planar_one_of_least_energy(degree
     """r/a = 0.1, h/t = 4: the least shape is reached above 54.987 degrees, not from 49 up to there.
 
     Energies by Romberg's scheme from 64, 128, 256 edges, against the boundary-value problem and the
-    planar rod. Either shape is unstable: index 1 under a moment, 2 or 3 left alone.
+    planar rod. Either shape is unstable: index 1 under a moment, 2 or 3 without grips.
     """
     ring, section = der.triangle(math.radians(degrees), 0.1), der.rectangular_section(4.0)
     energies, least_energies = [], []
@@ -397,7 +386,7 @@ def test_the_folded_triangle_is_not_always_the_planar_one_of_least_energy(degree
 
 
 def test_survey_of_an_ellipse(tmp_path):
-    """b/a = 0.6 about x, h/t = 1, 2, 3, 4: not folded, unstable, unstable left alone, stable."""
+    """b/a = 0.6 about x, h/t = 1, 2, 3, 4: not folded, unstable, unstable without grips, stable."""
     from scenarios.stability_beyond_symmetry import survey, write
 
     verdicts = survey(quick=True)
@@ -419,7 +408,7 @@ def test_random_rings_fold():
     assert found.folded > 0
 
 
-def test_leaving_a_ring_alone_never_stabilises_it():
+def test_removing_the_grips_never_stabilises_a_ring():
     """index_free >= index_moment >= index: each sets free what the last one held."""
     for (ring, h_over_t), n_edges in itertools.product(SHAPES, (64,)):
         at = folded(ring, h_over_t, n_edges=n_edges).at_pi

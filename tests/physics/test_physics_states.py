@@ -8,27 +8,31 @@ import numpy as np
 import pytest
 
 import der
-from der.analysis.landscape.landscape import scene_sector
 from der.analysis.multistability.deflation import solved
 from der.analysis.multistability.initial_guesses import covered, eight, gripped_starts
 from der.analysis.multistability.states import Search
 from der.analysis.multistability.symmetry_images import images
-from der.analysis.multistability.transitions import falls
-from der.rod.gripped_ring import free_ring, sector
-from der.rod.stability import all_modes, raw_index
+from der.analysis.multistability.transitions import descents
+from der.analysis.request import ring_of
+from der.rod.gripped_ring import free_supports, gripped_ring
 from scenarios import states_of_natural_curvature as over_curvature
 from scenarios.states_of_natural_curvature import ways_down
 
 
 @cache
-def whole(kappa0, bar, n_edges=64):
+def full(kappa0, bar, n_edges=64):
     """The full ring on its mesh."""
-    return sector(der.circle(kappa0), bar, n_edges, name="full")
+    return gripped_ring(der.circle(kappa0), bar, n_edges, name="full")
 
 
-def known(alone):
+def known(free):
     """A verified state."""
-    return solved(alone, images(alone.body, alone.held, alone.state.load))
+    return solved(free, images(free.rod, free.supports, free.state.load))
+
+
+def raw_index(free):
+    """Index by the signs of the pivots alone."""
+    return free.unpinned.count(free.state, "all")
 
 
 def bisected(index, low, high, tolerance=1e-10):
@@ -78,8 +82,8 @@ def test_indices_of_covered_circles_are_the_closed_form(n, h_over_t):
         near = {ways_down(n, kappa0 + d, bar.alpha, bar.beta) for d in (-0.06, 0.0, 0.06)}
         if len(near) > 1:
             continue
-        one = known(covered(whole(kappa0, bar), n))
-        assert one.alone.index() == near.pop()
+        one = known(covered(full(kappa0, bar), n))
+        assert one.free.index() == near.pop()
         assert one.energy == pytest.approx(math.pi * bar.alpha * (n - kappa0) ** 2, abs=1e-10)
         seen += 1
     assert seen >= 10
@@ -104,8 +108,7 @@ def test_thresholds_over_the_section_are_found_again(n, low, high, truth):
     """kappa0 = 1, nu = 0.3."""
 
     def index(h_over_t, n_edges):
-        alone = covered(whole(1.0, der.rectangular_section(h_over_t), n_edges), n)
-        return raw_index(alone.body, alone.held, all_modes(alone.held), alone.state)
+        return raw_index(covered(full(1.0, der.rectangular_section(h_over_t), n_edges), n))
 
     coarse, fine = (bisected(lambda h, N=N: index(h, N), low, high, 1e-8) for N in (64, 128))
     limit, left = extrapolated(fine, coarse)
@@ -119,8 +122,7 @@ def test_the_flat_ring_buckles_and_flips_where_it_should(low, high, truth):
     """alpha 0.9, beta 2.5; the flip is a mode of the mesh as well and has no error at all."""
 
     def index(kappa0, n_edges):
-        alone = covered(whole(kappa0, der.section(0.9, 2.5), n_edges), 1)
-        return raw_index(alone.body, alone.held, all_modes(alone.held), alone.state)
+        return raw_index(covered(full(kappa0, der.section(0.9, 2.5), n_edges), 1))
 
     coarse, fine = (bisected(lambda k, n=n: index(k, n), low, high) for n in (32, 64))
     limit, left = extrapolated(fine, coarse)
@@ -137,7 +139,7 @@ def test_energy_of_the_figure_eight(kappa0):
     From 32, 64 and 128 edges by Romberg's scheme: the last stage changes the tenth digit.
     """
     bar = der.rectangular_section(4.0)
-    values = [known(eight(whole(kappa0, bar, n))).energy for n in (32, 64, 128)]
+    values = [known(eight(full(kappa0, bar, n))).energy for n in (32, 64, 128)]
     once = [(4.0 * fine - coarse) / 3.0 for coarse, fine in pairwise(values)]
     limit = (16.0 * once[1] - once[0]) / 15.0
     truth = bar.alpha * (112.439610 / (4.0 * math.pi) + math.pi * kappa0**2)
@@ -151,21 +153,22 @@ def test_the_tilted_ring_lies_between_flat_and_flipped():
     """cos phi = -alpha kappa0/((beta - alpha) n): a state while it exists, and it falls to both."""
     bar = der.section(0.9, 2.5)
     kappa0 = 1.0
-    ring = whole(kappa0, bar)
+    ring = full(kappa0, bar)
     cosine = -0.9 / 1.6
     one = known(covered(ring, 1, math.acos(cosine)))
     sine = math.sqrt(1.0 - cosine**2)
     exact = math.pi * (0.9 * (cosine - kappa0) ** 2 + 2.5 * sine**2)
     assert one.energy == pytest.approx(exact, abs=1e-10)
-    index = one.alone.index()
-    ends = {round(fall.rests[-1].energy, 9) for fall in falls(one, index, images_of(ring))}
+    index = one.free.index()
+    found = descents(one, index, images_of(ring))
+    ends = {round(descent.rests[-1].energy, 9) for descent in found}
     flipped = math.pi * 0.9 * (1.0 + kappa0) ** 2
     assert index >= 1
     assert ends == {0.0, round(flipped, 9)}
 
 
 def images_of(ring):
-    return images(ring.body, free_ring(ring.body), 0.0)
+    return images(ring.rod, free_supports(ring.rod), 0.0)
 
 
 # --- The search ------------------------------------------------------------------------------
@@ -209,11 +212,10 @@ def test_deflation_finds_the_three_states_between_the_folds_from_one():
     """
     scene = der.Scene(der.circle(), der.rectangular_section(1.6))
     gamma = 2.7
-    ring = scene_sector(scene, "full")
-    ways = images(ring.body, ring.held, gamma)
-    on_path = [known(alone) for alone in gripped_starts(scene, ring, gamma)][:3]
-    search = Search(ways, count=3)
-    for _ in search.run(iter([on_path[0].alone])):
+    ring = ring_of(scene, "full")
+    on_path = [known(free) for free in gripped_starts(scene, ring, gamma)][:3]
+    search = Search(images(ring.rod, ring.supports, gamma), count=3)
+    for _ in search.run(iter([on_path[0].free])):
         pass
     assert [one.energy for one in search.known] != [one.energy for one in on_path]
     np.testing.assert_allclose(
