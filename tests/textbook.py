@@ -225,9 +225,8 @@ def scalar(
             *work(one, p),
         )
 
-    return Potential(
-        terms, observed={"x": lambda x, p: (float(x[0]), np.array([1.0, 0.0]))}, **options
-    )
+    unknown = {"x": lambda x, p: (float(x[0]), np.array([1.0, 0.0]))}
+    return Potential(terms, observed=unknown, **options)
 
 
 def cusp(u: float) -> Potential:
@@ -271,7 +270,7 @@ def isola(r: float) -> Potential:
 
 
 def hyperbola(e: float) -> Potential:
-    """Return V = x^3/3 - (p^2 - e^2) x: paths that come within 2 e of each other, x^2 = p^2 - e^2."""
+    """Return V = x^3/3 - (p^2 - e^2) x: two paths, x^2 = p^2 - e^2, that come within 2 e."""
     return scalar(
         lambda x, p: x * x - p * p + e * e,
         lambda x, p: 2.0 * x,
@@ -293,8 +292,8 @@ def graph(
 def branch_beside_fold(b: float, *, apart: bool) -> Potential:
     """Return V = y^3/3 + (p - 1) y + (y - b) z^2/2 + z^4/4.
 
-    On its symmetric path z = 0, p = 1 - y^2, the mode in y makes a fold at y = 0, p = 1, and the one
-    in z a branch point at y = b, p = 1 - b^2.
+    On its symmetric path z = 0, p = 1 - y^2, the mode in y makes a fold at y = 0, p = 1, and the
+    one in z a branch point at y = b, p = 1 - b^2.
 
     Parameters
     ----------

@@ -26,7 +26,9 @@ from der.scene import Scene
 from der.utils.files import FilePath, write_whole
 
 EDGES = 128
-LOADS = tuple(np.linspace(0.0, math.pi, 257))  # states at these, so that integrals are accurate
+LOADS = tuple(np.linspace(0.0, math.pi, 321))  # states at these, so that integrals are accurate
+# rad, from a fold: there gamma is quadratic along the path
+BESIDE = tuple(LOADS[1] * (k / 4) ** 2 for k in range(1, 5))
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,10 @@ def loop(name: str) -> Loop:
     ring, h_over_t = SNAPPING[name]
     section = rectangular_section(h_over_t)
     scene = Scene(ring, section, n_edges=EDGES, self_crossings=False, shapes=True, save_at=LOADS)
-    turned = fold(replace(scene, control="angle", unload=True, history=True))
+    folds = fold(replace(scene, shapes=False, stability=False, save_at=())).folds
+    beside = {point.gamma + sign * away for point in folds for away in BESIDE for sign in (-1, 1)}
+    loads = tuple(sorted({*LOADS, *beside}))
+    turned = fold(replace(scene, control="angle", unload=True, history=True, save_at=loads))
     landed = {point.gamma for point in turned.points if point.kind == "snap"}
     return Loop(name, fold(replace(scene, save_at=tuple({*LOADS, *landed}))), turned)
 

@@ -105,7 +105,7 @@ def test_interpolant_keeps_no_solutions_that_lie_close_to_others():
 
 
 def test_polynomials_of_degree_six_are_followed_exactly():
-    """A cubic and three solutions determine it: what is added vanishes with its rate at the ends."""
+    """A cubic and three solutions determine it: what is added, and its rate, vanish at the ends."""
     length, places = 2.0, np.array([0.25, 0.5, 0.75])
     p = np.polynomial.Polynomial([0.0, 1.0, -2.0, 0.5, 3.0, -1.0, 0.7])
     cubic = [p.deriv()(0.0), p(length), p.deriv()(length)]

@@ -213,9 +213,11 @@ def test_bad_input_is_named(call, words):
 
 
 def test_a_path_that_is_lost_says_so():
-    """Drawn straight but for 1e-5 a coarse ring bends too far: what was found stays."""
+    """Sixteen edges are taut at 7 pi/8, short of pi: what was found up to there stays."""
     found = der.squeeze(scene(der.circle(), 16, error_bars=False), math.pi - 1e-5)
     assert found.status == "not converged"
-    assert "a between the points" in found.message
+    assert f"distance = {7.0 * math.pi / 8.0:.6f}" in found.message
     assert len(found) > 3
+    assert np.all(np.diff(found.distance) > 0.0)
+    assert 7.0 * math.pi / 8.0 - 1e-6 < found.distance[-1] < 7.0 * math.pi / 8.0
     assert found.shapes.x.shape[0] == len(found)

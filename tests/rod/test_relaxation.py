@@ -8,10 +8,10 @@ from rods import E1, E3, MEASURES, solved, straight, unloaded
 
 import der
 from der.kernels.assembly import assemble
-from der.kernels.forces import Motion, Pull, gradient, no_pull
+from der.kernels.forces import Motion, Pull, gradient
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
-from der.rod.relaxation import Relaxed, Rest, relax
+from der.rod.relaxation import Relaxed, Rest, _no_pull, relax
 from der.rod.rod import Rod, State, edges
 from der.rod.supports import Supports, supported
 from der.rod.system import RodSystem
@@ -40,7 +40,7 @@ def pull_on(rod: Rod, supports: Supports, state: State) -> tuple[float, Pull]:
     """Return energy and forces of a state at rest."""
     rest = np.zeros(supports.free.shape), np.zeros(1)
     motion = Motion(state.quat, state.stretch, np.array([state.load]), *rest, *rest)
-    pull = no_pull(supports)
+    pull = _no_pull(supports)
     energy, _ = gradient(rod, supports, motion, pull)
     return energy, pull
 
