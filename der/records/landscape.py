@@ -106,13 +106,10 @@ class Landscape(Record):
 
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
         """The entries of the path, but for those that are always the same, and the others."""
-        of_path = entries.pop("path")
-        for name in ("schema", *self._KNOWN):
-            del of_path[name]
-        timing = of_path.pop("timing")
-        entries["why"] = entries["barriers"].pop("why")
-        last = {name: entries.pop(name) for name in ("why", "extrapolated")}
-        return super().on_disk(of_path | entries | last | {"timing": timing})
+        path = entries.pop("path")
+        first = {name: path[name] for name in _OF_PATH}
+        last = {"why": entries["barriers"].pop("why"), "extrapolated": entries.pop("extrapolated")}
+        return super().on_disk(first | entries | last | {"timing": path["timing"]})
 
     @classmethod
     def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
@@ -159,6 +156,8 @@ class Landscape(Record):
         return tuple(rest for rest in self.rests if rest.kind == "saddle")
 
 
+_ABOUT = ("status", "message", "reason", "ring", "section", "numerics")
+_OF_PATH = (*_ABOUT, "gamma", "energy", "moment", "index", "index_moment", "points")
 _OWN = ("rests", "folded", "barriers", "why", "extrapolated")
 _ALONG = gaps("h_over_t")
 

@@ -125,6 +125,7 @@ class Path(Record):
 
     NAME: ClassVar[str] = "path"
     PLOT: ClassVar[str] = "der.viz.plots.path"
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("status", "message", "reason", "raw")
 
     solver: Annotated[str, one_of(SOLVERS)]
     status: Status = "done"  # what there is of an incomplete path is good
