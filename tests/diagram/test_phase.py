@@ -10,12 +10,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import typer
 from here import Here
 
 import der
+from der.cli.figures import PhaseOptions
+from der.cli.figures import phase as command
 from der.diagram.boundaries import Boundaries
 from der.diagram.cases import LABELS, Row
-from der.diagram.diagram import phase_diagram, run_phase
+from der.diagram.diagram import phase_diagram
 from der.diagram.families import family
 from der.diagram.rod_check import rod_check, table
 from der.diagram.scan import scan
@@ -65,7 +68,7 @@ def folder(tmp_path_factory):
 def diagram(folder, without_curves):
     """A small part of fig3a round the circle, with the rod asked about some of it."""
     options = {"ranges": CIRCLES, "finest": 4, "check": der.fold, "sample": 8}
-    return phase_diagram("fig3a", folder, workers=2, progress=False, **options)
+    return phase_diagram("fig3a", folder, workers=1, progress=False, **options)
 
 
 # --- The files -------------------------------------------------------------------------------
@@ -112,35 +115,36 @@ def test_folder_with_cases_is_refused_unless_resumed(diagram, folder):
     assert (folder / "cases.csv").read_bytes() == before
 
 
-def test_command_gets_its_words(diagram, folder):
+def options_of(folder, **more):
+    """Options of the command for the diagram of these tests."""
+    span = ["b_over_a=0.9:1", "h-over-t=1.25:2.25"]
+    return PhaseOptions("fig3a", str(folder), workers=1, resume=True, span=span, finest=4, **more)
+
+
+def test_command_says_what_it_did(diagram, folder, capsys):
     """Cases by label, boundaries and files."""
-    words = run_phase(
-        "fig3a",
-        folder,
-        workers=1,
-        resume=True,
-        ranges=["b_over_a=0.9:1", "h-over-t=1.25:2.25"],
-        finest=4,
-        quiet=True,
-    )
-    assert f"{len(diagram.rows)} cases, 0 solved now" in words
-    assert "unstable, snap-back" in words
-    assert str(folder / "fig3a.png") in words
+    assert command(options_of(folder)) == 0
+    text = capsys.readouterr().out
+    assert f"{len(diagram.rows)} cases, 0 solved now" in text
+    assert "unstable, snap-back" in text
+    assert str(folder / "fig3a.png") in text
 
 
-def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
+def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch, capsys):
     """Without boundaries, edges of the scan; with one that ends in the middle, that end."""
     half = [replace(curve, points=curve.points[:2]) for curve in diagram.curves]
-    told = []
     for curves in ([], half):
         monkeypatch.setattr("der.diagram.diagram.follow", lambda *_, c=curves: Boundaries(c, []))
-        options = {"ranges": ["b_over_a=0.9:1", "h-over-t=1.25:2.25"], "finest": 4, "quiet": True}
-        run_phase("fig3a", folder, workers=1, resume=True, warn=told.append, **options)
+        command(options_of(folder, quiet=True))
+    output = capsys.readouterr()
+    assert output.out == ""
+    told = [line.removeprefix("der: ") for line in output.err.splitlines()]
     monkeypatch.setattr(
         "der.diagram.diagram.phase_diagram", lambda *_, **__: replace(diagram, curves=half)
     )
-    draw(["fig3a"], folder, warn=told.append)
-    assert told[-2:] == told[-4:-2]
+    drawn = []
+    draw(["fig3a"], folder, warn=drawn.append)
+    assert drawn == told[-2:]
     assert re.fullmatch(r"fig3a: edges of the scan without a boundary .*: \d+", told[0])
     assert re.fullmatch(
         r"fig3a: ends of boundaries that lead nowhere: \d+, the first with b_over_a = .*", told[-1]
@@ -150,8 +154,7 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"ranges": ["b_over_a"]}, "ranges must be like b_over_a=0.7:1, got 'b_over_a'"),
-        ({"ranges": ["r_over_a=0.1:1"]}, "ranges of fig3a must be of b_over_a, h_over_t"),
+        ({"ranges": {"r_over_a": (0.1, 1.0)}}, "ranges of fig3a must be of b_over_a, h_over_t"),
         ({"sample": 0}, "sample must be a whole number from 1, got 0"),
         ({"workers": 0}, "workers must be a whole number from 1, got 0"),
         ({"workers": 2, "scheduler": "tcp://x:1"}, "workers cannot be given together with a"),
@@ -159,7 +162,13 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
 )
 def test_what_is_not_allowed_is_refused_by_name(tmp_path, options, message):
     with pytest.raises(ValueError, match=message):
-        run_phase("fig3a", tmp_path / "new", **options)
+        phase_diagram("fig3a", tmp_path / "new", **options)
+
+
+def test_range_needs_two_numbers(tmp_path):
+    """The message names the option and shows its form."""
+    with pytest.raises(typer.TyperException, match=r"must be like b_over_a=0\.7:1, got 'b_over_a'"):
+        command(PhaseOptions("fig3a", str(tmp_path / "new"), span=["b_over_a"]))
 
 
 def test_a_file_is_no_folder(tmp_path):

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path as File
 
 from der.diagram.cases import Case, Row, solve_case
-from der.diagram.diagram import STORE, run_phase
+from der.diagram.diagram import STORE, phase_diagram
 from der.diagram.store import Store
 from validation.arguments import Arguments
 
@@ -208,13 +208,13 @@ class Wanted:
 
 def draw(wanted: Wanted, folder: str) -> None:
     """What a process does that may be killed."""
-    run_phase(
+    phase_diagram(
         wanted.diagram,
         folder,
         workers=wanted.workers,
         finest=wanted.finest,
         resume=True,
-        quiet=True,
+        progress=False,
         solve=noted,
     )
 
