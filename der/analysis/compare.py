@@ -29,7 +29,7 @@ FAR = 0.05  # of the scaled plane; what lies farther apart belongs to another br
 
 def compare(
     scene: Scene,
-    rod: Path,
+    rod: Path | None = None,
     *,
     tolerance: float = TOLERANCE,
     progress: Callable[[float], object] | None = None,
@@ -39,8 +39,9 @@ def compare(
     Parameters
     ----------
     scene : what was folded, by arc length.
-    rod : its path, from `der.fold`; with error bars (`Scene.error_bars`) to say whether it agrees.
-    tolerance : of the boundary-value problem, see `solve`.
+    rod : its path, where `der.fold` has found it already. With error bars (`Scene.error_bars`) it
+        is said whether both agree.
+    tolerance : of the boundary-value problem, see `solve_bvp`.
     progress : called with gamma [rad] after every state of the boundary-value problem.
 
     Raises
@@ -48,8 +49,12 @@ def compare(
     ValueError
         For a scene that the boundary-value solver cannot do, or a path that is not of a rod.
     NotConverged
-        Where the boundary-value problem's path cannot be followed to its end.
+        Where a path cannot be followed to its end.
     """
+    if rod is None:
+        from der.analysis.fold import fold
+
+        rod = fold(scene)
     if rod.solver != "der":
         raise ValueError(f"rod must be a path of a rod (solver 'der'), got {rod.solver!r}")
     wanted = replace(

@@ -63,7 +63,7 @@ def test_a_record_is_short_in_print(name):
     assert "\n" not in said
 
 
-@every_kind
+@pytest.mark.parametrize("name", ["states", "barriers"])
 def test_a_notebook_shows_a_table_and_a_picture(name):
     shown = loaded(name)._repr_html_()
     assert shown.startswith("<table>")
