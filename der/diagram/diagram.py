@@ -199,7 +199,9 @@ def _written(
     beside: Sequence[Row],
 ) -> tuple[File, ...]:
     """Write boundaries, check and picture; the table of cases has long been written."""
-    from der.viz.plots.phase_diagram import save_diagram
+    from der.diagram.picture import picture
+    from der.viz.plots.phase_diagram import draw
+    from der.viz.plots.style import save
 
     curves, corners = bounds
     files = [
@@ -208,8 +210,9 @@ def _written(
     ]
     if compared:
         files.append(_write(folder / "check.csv", CHECK_COLUMNS, map(_check_cells, compared)))
-    files.append(save_diagram(found, curves, folder / f"{found.family.name}.png", beside))
-    return tuple(files)
+    file = folder / f"{found.family.name}.png"
+    save(draw(picture(found, curves, beside)), file)
+    return (*files, file)
 
 
 MODE_COLUMNS = ("label", "foldable", "stable", "snapping", "moment", "slope", "folds", "error")

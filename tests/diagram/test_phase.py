@@ -20,15 +20,15 @@ from der.diagram.boundaries import Boundaries
 from der.diagram.cases import LABELS, Row
 from der.diagram.diagram import phase_diagram
 from der.diagram.families import family
+from der.diagram.picture import picture
 from der.diagram.rod_check import rod_check, table
 from der.diagram.scan import scan
 from der.diagram.scanned_boundaries import BoundaryPoint, Curve, scanned_boundaries
 from der.diagram.store import Store
 from der.paper import draw
-from der.viz.plots.phase_diagram import NAMES, save_diagram
-from der.viz.plots.phase_diagram import _others as others
-from der.viz.plots.phase_diagram import _regions as regions
-from der.viz.plots.phase_diagram import _segments as pieces
+from der.viz.plots.phase_diagram import draw as draw_diagram
+from der.viz.plots.regions import pixels
+from der.viz.plots.style import save
 from validation.benchmark import phase as bench_phase
 from validation.stress import kill_and_resume as killed
 
@@ -278,7 +278,8 @@ def test_colours_change_where_the_boundary_is(tmp_path):
     curves = [Curve("foldability", "x", tuple(points))]
     wrong = []
     for lines in (curves, []):
-        colours = regions(found, "x", None, pieces(of, "x", lines))
+        (plane,) = picture(found, lines).slices
+        colours = pixels(plane.sheets[0], plane.boundaries)
         at = (np.arange(len(colours)) + 0.5) / len(colours) - 0.5
         radius = np.hypot(*np.meshgrid(at, at, indexing="ij"))
         clear = np.abs(radius - 0.3) > 0.1 / 16
@@ -301,7 +302,8 @@ def test_cube_is_drawn_in_slices(tmp_path, name):
     for curve in curves:
         parts = [of.unit(point.case)[1] for point in curve.points]
         assert parts == pytest.approx([round(4 * parts[0]) / 4] * len(parts), abs=1e-9)
-    file = save_diagram(found, curves, tmp_path / f"{name}.png")
+    file = tmp_path / f"{name}.png"
+    save(draw_diagram(picture(found, curves)), file)
     assert file.read_bytes().startswith(FORMAT)
 
 
@@ -316,8 +318,9 @@ def test_failed_cases_have_a_colour_of_their_own(tmp_path):
         )
 
     found = scanned(family("fig5c", finest=16), tmp_path, fails)
-    save_diagram(found, [], tmp_path / "failed.png")
-    assert NAMES[-1] == "failed"
+    figure = draw_diagram(picture(found, []))
+    said = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "failed" in said
 
 
 def test_a_wedge_between_nodes_is_coloured(tmp_path):
@@ -339,7 +342,8 @@ def test_a_wedge_between_nodes_is_coloured(tmp_path):
     beside = [band(of.case("x", place)) for place in places]
     wrong = []
     for rows in (beside, []):
-        colours = regions(found, "x", None, pieces(of, "x", curves), others(of, "x", rows))
+        (plane,) = picture(found, curves, rows).slices
+        colours = pixels(plane.sheets[0], plane.boundaries)
         y = (np.arange(len(colours)) + 0.5) / len(colours) * 16
         expected = np.array([0, 2, 1])[(y > 8.4).astype(int) + (y > 8.6)]
         wrong.append(int((colours != expected).sum()))
