@@ -21,12 +21,7 @@ FLOOR = 1e-13  # of the distances drawn: rounding
 
 
 def draw(comparison: Comparison) -> Figure:
-    """The picture of a comparison: M and U of both solvers over distances and their error bars.
-
-    Parameters
-    ----------
-    comparison : with the paths `rod` and `bvp`, and `states` with distances and bars.
-    """
+    """The picture of a comparison: M and U of both solvers over distances and their error bars."""
     rod, bvp = comparison.rod, comparison.bvp
     figure = blank(8.0, 7.0, title(rod, f"{bvp.numerics['intervals']} intervals"))
     grid = figure.add_gridspec(

@@ -145,6 +145,3 @@ def _draw_ribbons(row: Axes, path: Path, shapes: Shapes, chosen: list[int]) -> N
         text = rf"$\bf{{{LETTERS[i]}}}$   $\gamma$ = {times_pi(path.gamma[chosen[i]])}"
         row.text(i * slot, -tall / 2, text, ha="center", va="top", fontsize=8, color=INK)
     bare(row, (-slot / 2, -0.62 * tall), ((len(ribbons) - 0.5) * slot, 0.5 * tall))
-
-
-figure_of_path = draw  # until callers are moved

@@ -168,6 +168,3 @@ def legend_below(figure: Figure, handles: Sequence[Any], *, fontsize: float = 8.
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()
-
-
-save_figure = save  # until callers are moved
