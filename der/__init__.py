@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from der.bvp.solve import solve_bvp
     from der.diagram.diagram import phase_diagram
     from der.errors import Interrupted, NotConverged
-    from der.geometry.ring import Ring, circle, ellipse, profile, rectangle, triangle
+    from der.geometry.ring import Ring
     from der.geometry.section import Scale, Section, rectangular_section, section
+    from der.geometry.shapes import circle, ellipse, profile, rectangle, triangle
     from der.records.comparison import Comparison
     from der.records.configurations import Shapes
     from der.records.energy_surface import Surface
@@ -95,11 +96,11 @@ _HOME = {
     "solve_bvp": ("der.bvp.solve", "solve_bvp"),
     "phase_diagram": ("der.diagram.diagram", "phase_diagram"),
     "Ring": ("der.geometry.ring", "Ring"),
-    "circle": ("der.geometry.ring", "circle"),
-    "ellipse": ("der.geometry.ring", "ellipse"),
-    "profile": ("der.geometry.ring", "profile"),
-    "rectangle": ("der.geometry.ring", "rectangle"),
-    "triangle": ("der.geometry.ring", "triangle"),
+    "circle": ("der.geometry.shapes", "circle"),
+    "ellipse": ("der.geometry.shapes", "ellipse"),
+    "profile": ("der.geometry.shapes", "profile"),
+    "rectangle": ("der.geometry.shapes", "rectangle"),
+    "triangle": ("der.geometry.shapes", "triangle"),
     "Scale": ("der.geometry.section", "Scale"),
     "Section": ("der.geometry.section", "Section"),
     "rectangular_section": ("der.geometry.section", "rectangular_section"),

@@ -17,8 +17,8 @@ from der.continuation.events import EIGHTH, Visit, Wanted, full_index, three_cov
 from der.continuation.step import Stuck, Tally
 from der.errors import STOPPED, Interrupted, NotConverged, Reason
 from der.geometry.mesh import sites
-from der.geometry.ring import circle
 from der.geometry.section import section
+from der.geometry.shapes import circle
 from der.kernels.assembly import assemble
 from der.kernels.quaternions import Array
 from der.records.configurations import Shapes

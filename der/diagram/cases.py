@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from der.geometry.ring import Ring, ring_from_json
+from der.geometry.ring import Ring
 from der.geometry.section import rectangular_section
+from der.geometry.shapes import ring_from_json
 from der.records.path import Path
 from der.scene import Scene
 

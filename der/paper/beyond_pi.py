@@ -7,7 +7,7 @@ from pathlib import Path as File
 
 import numpy as np
 
-from der.geometry.ring import circle
+from der.geometry.shapes import circle
 from der.paper import canvas
 from der.paper.bars import bar
 from der.paper.cases import (

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from der.bvp.folded_shape import folded
 from der.bvp.packing import packing_ratio
-from der.geometry.ring import Ring, ellipse, rectangle, triangle
+from der.geometry.ring import Ring
+from der.geometry.shapes import ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.canvas import INK, QUIET
 from der.paper.cases import Array

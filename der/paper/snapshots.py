@@ -7,7 +7,8 @@ from pathlib import Path as File
 
 import numpy as np
 
-from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
+from der.geometry.ring import Ring
+from der.geometry.shapes import circle, ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.bars import Camera, Picture, bar, camera
 from der.paper.cases import (
