@@ -10,6 +10,7 @@ import base64
 import io
 import os
 import pathlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
@@ -43,6 +44,7 @@ class Record(Checked, Saved):
     KIND: ClassVar[str] = ""  # the first entry; "": the file has none
     PLOT: ClassVar[str]  # the module whose function `draw` makes the figure
 
+    ring: Mapping[str, object]
     timing: SolveTime
 
     def to_json(self) -> str:
@@ -106,8 +108,8 @@ class Record(Checked, Saved):
 
     # --- Shown ---------------------------------------------------------------------------------
 
-    def facts(self) -> dict[str, str]:
-        """The main facts, each in a few words, by what it is a fact of."""
+    def facts(self) -> list[str]:
+        """The main facts of this kind, each in a few words."""
         raise NotImplementedError
 
     def plot(self, file: FilePath | None = None) -> Figure:
@@ -133,15 +135,17 @@ class Record(Checked, Saved):
         return figure
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(self.facts().values())})"
+        return f"{type(self).__name__}({', '.join(self._all_facts())})"
 
     def _repr_html_(self) -> str:
         """A table of the main facts, and the picture, for notebooks."""
-        rows = "".join(
-            f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>"
-            for name, text in self.facts().items()
-        )
-        return f"<table><caption>{escape(self.NAME)}</caption>{rows}</table>{self._picture()}"
+        cells = "".join(f"<td>{escape(text)}</td>" for text in self._all_facts())
+        table = f"<table><tr><th>{escape(self.NAME)}</th>{cells}</tr></table>"
+        return table + self._picture()
+
+    def _all_facts(self) -> list[str]:
+        """The ring, what is special, and the status."""
+        return [str(self.ring.get("shape")), *self.facts(), getattr(self, "status", "done")]
 
     def _picture(self) -> str:
         """The picture as an element of HTML; "" where there is nothing to draw."""

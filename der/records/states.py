@@ -87,15 +87,10 @@ class States(Record):
                 if name not in names:
                     raise ValueError(f"transitions must be between states, got {name!r}")
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, how many states, and how the search ended."""
-        return {
-            "ring": str(self.ring.get("shape")),
-            "grips": "free" if self.gamma is None else f"gamma={self.gamma:.6g}",
-            "states": f"{len(self)} states",
-            "minima": f"{len(self.minima)} minima",
-            "status": self.status,
-        }
+    def facts(self) -> list[str]:
+        """How many states, and where."""
+        place = "free" if self.gamma is None else f"gamma={self.gamma:.6g}"
+        return [place, f"{len(self)} states", f"{len(self.minima)} minima"]
 
     def __len__(self) -> int:
         return len(self.states)
