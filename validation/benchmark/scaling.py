@@ -69,7 +69,7 @@ def scale(n: int, repeats: int) -> Scale:
 def _newton(n: int, repeats: int) -> tuple[float, float, Sector]:
     """CPU time of one iteration of the full ring, the residual it ends with, and the ring.
 
-    Timed as whole solves at a given gamma; the last pass of a solve, for tangent and index, costs
+    Complete solves at a given gamma are timed. The last pass of a solve, for tangent and index, costs
     an iteration, and so does its share of the call.
     """
     ring = sector(der.circle(), der.rectangular_section(4.0), n, name="full")

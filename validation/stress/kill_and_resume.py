@@ -132,9 +132,9 @@ def kill(process: Process, *, workers_too: bool = True) -> bool:
     return there
 
 
-def lost(store: File, told: File, before: Counter[str]) -> int:
+def lost(store: File, notes_file: File, before: Counter[str]) -> int:
     """How many cases were begun since ``before``, and are not in the store."""
-    begun = notes(told) - before
+    begun = notes(notes_file) - before
     if not store.exists():
         return begun.total()
     with Store(store) as safe:
@@ -145,7 +145,7 @@ def kill_and_resume(
     start: Callable[[], Process],
     moments: Sequence[Callable[[Process], object]],
     store: File,
-    told: File,
+    notes_file: File,
 ) -> tuple[int, ...]:
     """Start runs and kill each at its moment, then let one finish; what was in flight at kills.
 
@@ -153,7 +153,7 @@ def kill_and_resume(
     ----------
     start : of a run that resumes, in a session of its own
     moments : each returns when its run is to be killed, or has ended
-    store, told : the run's store and the notes of its workers
+    store, notes_file : the run's store and the notes of its workers
 
     Raises
     ------
@@ -162,11 +162,11 @@ def kill_and_resume(
     """
     flight = []
     for moment in moments:
-        before = notes(told)
+        before = notes(notes_file)
         process = start()
         moment(process)
         if kill(process):
-            flight.append(lost(store, told, before))
+            flight.append(lost(store, notes_file, before))
     process = start()
     _, words = process.communicate()
     if process.returncode:
@@ -185,7 +185,7 @@ class Wanted:
     finest: int
     workers: int
 
-    def start(self, folder: File, told: File) -> Process:
+    def start(self, folder: File, notes_file: File) -> Process:
         """Draw it in a folder, going on with what is there, with notes taken."""
         return subprocess.Popen(
             [
@@ -193,7 +193,7 @@ class Wanted:
                 "-c",
                 f"from {__spec__.name} import *; {self!r}.draw({str(folder)!r})",
             ],
-            env={**os.environ, NOTES: str(told)},
+            env={**os.environ, NOTES: str(notes_file)},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
@@ -221,7 +221,7 @@ class Wanted:
 
 def killed(wanted: Wanted, folder: File, *, times: int, seed: int) -> Killed:
     """A diagram drawn in one run and in one killed so often, in two folders of ``folder``."""
-    undisturbed, apart, told = folder / "one_run", folder / "killed", folder / "begun.txt"
+    undisturbed, apart, notes_file = folder / "one_run", folder / "killed", folder / "begun.txt"
     began = time.monotonic()
     wanted.draw_in_one_run(undisturbed)
     taken = time.monotonic() - began
@@ -236,9 +236,9 @@ def killed(wanted: Wanted, folder: File, *, times: int, seed: int) -> Killed:
             process.wait(wait)
 
     flight = kill_and_resume(
-        lambda: wanted.start(apart, told), [moment] * times, apart / STORE, told
+        lambda: wanted.start(apart, notes_file), [moment] * times, apart / STORE, notes_file
     )
-    begun = notes(told)
+    begun = notes(notes_file)
     return Killed(
         len(flight),
         len(begun),
@@ -251,10 +251,10 @@ def killed(wanted: Wanted, folder: File, *, times: int, seed: int) -> Killed:
 
 def _time_to_start(wanted: Wanted, folder: File) -> float:
     """Seconds until a run begins its first case."""
-    told = folder / "first.txt"
+    notes_file = folder / "first.txt"
     began = time.monotonic()
-    process = wanted.start(folder / "first", told)
-    while not told.exists() and process.poll() is None:
+    process = wanted.start(folder / "first", notes_file)
+    while not notes_file.exists() and process.poll() is None:
         time.sleep(0.01)
     ready = time.monotonic() - began
     kill(process)
