@@ -35,7 +35,7 @@ def scene(ring, n=128, **more):
 
 @pytest.mark.parametrize("natural", [1.0, 0.0, -0.5, 3.2])
 def test_covered_circles(natural):
-    """U = pi alpha (n - kappa0)^2, exactly on any mesh; never a way down in the plane."""
+    """U = pi alpha (n - kappa0)^2, exactly on any mesh; never unstable in the plane."""
     found = der.planar(scene(der.circle(natural), 64, error_bars=False))
     covered = [state for state in found.states if state.turning]
     turns = sorted(state.turning for state in covered)

@@ -100,7 +100,7 @@ def test_the_index_changes_by_one_at_a_fold(ring, h_over_t):
         assert abs(point.index_after - point.index_before) == by
 
 
-# --- folded rings, left alone -------------------------------------------------------------------
+# --- folded rings, released ---------------------------------------------------------------------
 
 
 def test_thresholds_of_the_free_three_covered_circle():
@@ -177,7 +177,7 @@ def test_slopes_about_both_axes_vanish_together(shape, b):
     """dM/dgamma = 0 at one h/t about x and y: then a mode of full symmetry has no stiffness.
 
     At M = 0 and slope 0 the grips push in no way, to first order, so the neighbouring state is one
-    of the ring left alone; twisted about either axis it has the same symmetry. To the bisection.
+    of the free ring; twisted about either axis it has the same symmetry. To the bisection.
     """
     at = []
     for axis in "xy":
@@ -187,7 +187,7 @@ def test_slopes_about_both_axes_vanish_together(shape, b):
     assert at[0] == pytest.approx(at[1], rel=1e-6)
 
 
-def test_an_ellipse_that_the_slope_calls_stable_is_not_when_left_alone():
+def test_an_ellipse_that_the_slope_calls_stable_is_not_when_released():
     """b/a = 0.6: the slope is positive above h/t = 2.195, the free ring a minimum above 3.63 only.
 
     The order is 2. Under a moment the index follows the slope.
@@ -204,8 +204,8 @@ def test_an_ellipse_that_the_slope_calls_stable_is_not_when_left_alone():
     [(der.ellipse(0.6), 3.0, -0.10951), (OBTUSE, 4.0, -1.7905)],
     ids=str,
 )
-def test_the_way_down_converges(ring, h_over_t, softest):
-    """The stiffness of the mode that unfolds a ring left alone, from 64, 128 and 256 edges.
+def test_the_unstable_mode_converges(ring, h_over_t, softest):
+    """The stiffness of the mode that unfolds a free ring, from 64, 128 and 256 edges.
 
     Of order 2; extrapolated to 2e-4 of what the next pair gives.
     """
@@ -221,7 +221,7 @@ def test_the_way_down_converges(ring, h_over_t, softest):
 
 @pytest.mark.parametrize(("ring", "h_over_t"), [(der.ellipse(0.6), 3.0), (OBTUSE, 4.0)], ids=str)
 @pytest.mark.parametrize("a_over_t", [50.0, 200.0])
-def test_stretch_leaves_the_way_down(ring, h_over_t, a_over_t):
+def test_stretch_leaves_the_unstable_mode(ring, h_over_t, a_over_t):
     """With edges that stretch, one more unknown each and no constraint, the free index is 1, too.
 
     The state is solved for anew, free of grips.
@@ -239,7 +239,7 @@ def test_stretch_leaves_the_way_down(ring, h_over_t, a_over_t):
 
 @pytest.mark.parametrize(("ring", "h_over_t"), [(der.ellipse(0.6), 3.0), (OBTUSE, 4.0)], ids=str)
 def test_a_ring_left_alone_unfolds_to_flat(ring, h_over_t):
-    """Kicked by 0.02 rad along either sign of the way down it comes to rest flat, U = 0.
+    """Kicked by 0.02 rad along either sign of the unstable mode it comes to rest flat, U = 0.
 
     Dynamic relaxation knows no Hessian. Above the free threshold a kick along the softest mode
     decays instead.
@@ -377,7 +377,7 @@ def test_the_folded_triangle_is_not_always_the_planar_one_of_least_energy(degree
     """r/a = 0.1, h/t = 4: the least shape is reached above 54.987 degrees, not from 49 up to there.
 
     Energies by Romberg's scheme from 64, 128, 256 edges, against the boundary-value problem and the
-    planar rod. Either shape is unstable: index 1 under a moment, 2 or 3 left alone.
+    planar rod. Either shape is unstable: index 1 under a moment, 2 or 3 when released.
     """
     ring, section = der.triangle(math.radians(degrees), 0.1), der.rectangular_section(4.0)
     energies, least_energies = [], []
@@ -397,7 +397,7 @@ def test_the_folded_triangle_is_not_always_the_planar_one_of_least_energy(degree
 
 
 def test_survey_of_an_ellipse(tmp_path):
-    """b/a = 0.6 about x, h/t = 1, 2, 3, 4: not folded, unstable, unstable left alone, stable."""
+    """b/a = 0.6 about x, h/t = 1, 2, 3, 4: not folded, unstable, unstable when released, stable."""
     from scenarios.stability_beyond_symmetry import survey, write
 
     verdicts = survey(quick=True)

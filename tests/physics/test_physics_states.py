@@ -148,7 +148,7 @@ def test_energy_of_the_figure_eight(kappa0):
 
 
 def test_the_tilted_ring_lies_between_flat_and_flipped():
-    """cos phi = -alpha kappa0/((beta - alpha) n): a state while it exists, and it falls to both."""
+    """cos phi = -alpha kappa0/((beta - alpha) n): a state while it exists; it relaxes to both."""
     bar = der.section(0.9, 2.5)
     kappa0 = 1.0
     ring = whole(kappa0, bar)
