@@ -1,4 +1,4 @@
-"""The states of a ring, how stable they are and which of them falls to which; free of kernels."""
+"""The states of a ring, how stable they are and which of them snaps to which; free of kernels."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Transition(Checked):
     end: Text | None  # a minimum; None: it came to no rest
     stiffness: Number  # eigenvalue of the mode pushed along, GJ/a^2, < 0
     sign: Integer  # of the push
-    via: tuple[Text, ...]  # saddles on which symmetry let it rest, before it was nudged on
+    via: tuple[Text, ...]  # saddles where its symmetry held it, until it was perturbed
     released: Number | None  # energy, GJ/a
 
 
@@ -107,6 +107,6 @@ class States(Record):
         return tuple(state for state in self.states if state.stable)
 
     def falls_to(self, name: str) -> tuple[str, ...]:
-        """The minima that a state falls to, each once."""
+        """The minima that a state snaps to, each once."""
         ends = [fall.end for fall in self.transitions if fall.start == name]
         return tuple(dict.fromkeys(end for end in ends if end is not None))
