@@ -401,7 +401,7 @@ def test_survey_of_an_ellipse(tmp_path):
     from scenarios.stability_beyond_symmetry import survey, write
 
     verdicts = survey(quick=True)
-    names = ["not folded", "slope < 0", "slope > 0, unstable alone", "stable"]
+    names = ["not folded", "slope < 0", "slope > 0, unstable released", "stable"]
     assert [one.colour for one in verdicts] == names
     assert [one.wrong for one in verdicts] == ["", "", "c", ""]
     assert verdicts[2].slope == pytest.approx(0.5954817, abs=1e-6)

@@ -17,7 +17,7 @@ from der.analysis.multistability.transitions import falls
 from der.rod.gripped_ring import free_ring, sector
 from der.rod.stability import all_modes, raw_index
 from scenarios import states_of_natural_curvature as over_curvature
-from scenarios.states_of_natural_curvature import ways_down
+from scenarios.states_of_natural_curvature import continuum_index
 
 
 @cache
@@ -57,13 +57,13 @@ def extrapolated(fine, coarse):
 def test_closed_form_has_the_known_thresholds_over_the_section(n, h_over_t, below, above):
     """kappa0 = 1, nu = 0.3: thresholds of the n-covered circle to their last digit."""
     bars = [der.rectangular_section(h_over_t + d) for d in (-1e-6, 1e-6)]
-    assert [ways_down(n, 1.0, bar.alpha, bar.beta) for bar in bars] == [below, above]
+    assert [continuum_index(n, 1.0, bar.alpha, bar.beta) for bar in bars] == [below, above]
 
 
 @pytest.mark.parametrize("kappa0", [2.666667, -1.777778])
 def test_closed_form_has_the_known_thresholds_of_the_flat_ring(kappa0):
     """alpha 0.9, beta 2.5: (1 + y)(beta + y) = 4 beta, y = alpha (kappa0 - 1); and the flip."""
-    inside, outside = (ways_down(1, kappa0 * (1.0 + d), 0.9, 2.5) for d in (-1e-6, 1e-6))
+    inside, outside = (continuum_index(1, kappa0 * (1.0 + d), 0.9, 2.5) for d in (-1e-6, 1e-6))
     assert inside == 0
     assert outside > 0
 
@@ -75,7 +75,7 @@ def test_indices_of_covered_circles_are_the_closed_form(n, h_over_t):
     bar = der.rectangular_section(h_over_t)
     seen = 0
     for kappa0 in np.arange(-2.0, 4.1, 0.5).tolist():
-        near = {ways_down(n, kappa0 + d, bar.alpha, bar.beta) for d in (-0.06, 0.0, 0.06)}
+        near = {continuum_index(n, kappa0 + d, bar.alpha, bar.beta) for d in (-0.06, 0.0, 0.06)}
         if len(near) > 1:
             continue
         one = known(covered(whole(kappa0, bar), n))
