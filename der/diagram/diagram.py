@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
 
-from der.diagram.boundaries import Boundaries
 from der.diagram.cases import LABELS, PARAMETERS, Case, Row, solve_case
+from der.diagram.curves.slices import Boundaries
 from der.diagram.distributed import follow, loose_ends, unexplained
 from der.diagram.families import FAMILIES, Family, family
 from der.diagram.rod_check import Compared, Fold, rod_check, table

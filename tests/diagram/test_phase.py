@@ -16,8 +16,8 @@ from here import Here
 import der
 from der.cli.figures import PhaseOptions
 from der.cli.figures import phase as command
-from der.diagram.boundaries import Boundaries
 from der.diagram.cases import LABELS, Row
+from der.diagram.curves.slices import Boundaries
 from der.diagram.diagram import phase_diagram
 from der.diagram.families import family
 from der.diagram.picture import picture

@@ -17,9 +17,9 @@ from itertools import chain, combinations, product
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram.conditions import NotFound, Value, asymptotic, on, steepening
-from der.diagram.curve_tracing import EXACT, At, Function, by_differences, corrected
-from der.diagram.polylines import meetings, nearest
+from der.diagram.curves.conditions import NotFound, Value, asymptotic, on, steepening
+from der.diagram.curves.polylines import meetings, nearest
+from der.diagram.curves.tracing import EXACT, At, Function, by_differences, corrected
 from der.errors import ContinuationFailed
 
 FOLD = "foldability"

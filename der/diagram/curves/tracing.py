@@ -14,7 +14,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram.conditions import NotFound
+from der.diagram.curves.conditions import NotFound
 from der.errors import ContinuationFailed
 
 T = TypeVar("T")
