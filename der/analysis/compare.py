@@ -42,7 +42,7 @@ def compare(
     rod : its path, where `der.fold` has found it already. With error bars (`Scene.error_bars`) it
         is said whether both agree.
     tolerance : of the boundary-value problem, see `solve_bvp`.
-    progress : called with gamma [rad] after every state of the boundary-value problem.
+    progress : called with gamma [rad] after every state of either path.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def compare(
     if rod is None:
         from der.analysis.fold import fold
 
-        rod = fold(scene)
+        rod = fold(scene, progress=progress)
     if rod.solver != "der":
         raise ValueError(f"rod must be a path of a rod (solver 'der'), got {rod.solver!r}")
     wanted = replace(

@@ -16,9 +16,9 @@ from der.paper.cases import (
     at_vertices,
     smooth,
     solved,
-    write_shapes,
 )
 from der.paper.snapshots import LEVEL
+from der.paper.tables import write_shapes
 from der.utils.files import FilePath
 from der.viz.plots import style
 

@@ -18,8 +18,8 @@ from der.paper.cases import (
     in_words,
     plain,
     solved,
-    write_shapes,
 )
+from der.paper.tables import write_shapes
 from der.utils.files import FilePath
 
 EIGHTHS = (0, 2, 4, 5, 6, 7, 8)  # of pi: the snapshots; the ring moves most near the end
