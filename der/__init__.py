@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from der.analysis.planar.squeeze import squeeze
     from der.bvp.packing import packing_ratio
     from der.bvp.solve import solve_bvp
-    from der.diagram.diagram import phase_diagram
+    from der.diagram.diagram import PhaseDiagram, phase_diagram
     from der.errors import Interrupted, NotConverged, Reason
     from der.geometry.ring import Ring
     from der.geometry.section import Scale, Section, rectangular_section, section
@@ -45,8 +45,18 @@ __all__ += ["__version__", "rectangular_section", "section", "triangle"]
 __all__ += ["barrier", "compare", "energy_surface", "fold", "landscape", "least_push"]
 __all__ += ["packing_ratio", "phase_diagram", "planar", "solve_bvp", "squeeze", "states"]
 __all__ += ["AtPi", "BarrierCurves", "Barriers", "ComparedPoint", "ComparedState", "Comparison"]
-__all__ += ["Instant", "Landscape", "LeastPush", "Mode", "Pass", "Path", "PlanarState"]
-__all__ += ["PlanarStates", "Point", "Push", "Rest", "RingState", "Saddle", "Shapes", "Squeeze"]
+__all__ += ["Instant", "Landscape", "LeastPush", "Mode", "Pass", "Path", "PhaseDiagram"]
+__all__ += [
+    "PlanarState",
+    "PlanarStates",
+    "Point",
+    "Push",
+    "Rest",
+    "RingState",
+    "Saddle",
+    "Shapes",
+    "Squeeze",
+]
 __all__ += ["SqueezePoint", "States", "Surface", "Timing", "Transition"]
 __all__ += ["Interrupted", "NotConverged", "Reason"]
 
@@ -62,7 +72,7 @@ _NAMES = {  # by the module where they live
     "der.analysis.planar.squeeze": "squeeze",
     "der.bvp.packing": "packing_ratio",
     "der.bvp.solve": "solve_bvp",
-    "der.diagram.diagram": "phase_diagram",
+    "der.diagram.diagram": "PhaseDiagram phase_diagram",
     "der.errors": "Interrupted NotConverged Reason",
     "der.geometry.ring": "Ring",
     "der.geometry.section": "Scale Section rectangular_section section",

@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
+from typing import TYPE_CHECKING, ClassVar
 
 from der.diagram.cases import LABELS, PARAMETERS, Case, Row, solve_case
 from der.diagram.curves.slices import Boundaries
@@ -25,7 +26,11 @@ from der.diagram.scan import Scan, Solve, scan
 from der.diagram.scanned_boundaries import Corner, Curve
 from der.diagram.store import Store
 from der.diagram.workers import workers as started
+from der.records.record import Shown
 from der.utils.files import FilePath, write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["FAMILIES", "PhaseDiagram", "phase_diagram"]
 
@@ -33,8 +38,8 @@ STORE = "cases.jsonl"
 SAMPLE = 40
 
 
-@dataclass(frozen=True)
-class PhaseDiagram:
+@dataclass(frozen=True, repr=False)
+class PhaseDiagram(Shown):
     """A phase diagram.
 
     Attributes
@@ -47,6 +52,8 @@ class PhaseDiagram:
     seconds : what it took: the scan, the boundaries, the check
     """
 
+    NAME: ClassVar[str] = "phase diagram"
+
     scan: Scan
     curves: tuple[Curve, ...]
     corners: tuple[Corner, ...]
@@ -58,6 +65,18 @@ class PhaseDiagram:
     def family(self) -> Family:
         """What was scanned."""
         return self.scan.family
+
+    def facts(self) -> list[str]:
+        """Which family, and how much is known of it."""
+        sizes = (f"{len(self.rows)} cases", f"{len(self.curves)} boundaries")
+        return [self.family.name, *sizes, f"{len(self.corners)} corners"]
+
+    def figure(self) -> Figure:
+        """The regions of folding modes and their boundaries."""
+        from der.diagram.picture import picture
+        from der.viz.plots.phase_diagram import draw
+
+        return draw(picture(self.scan, self.curves))
 
     @property
     def rows(self) -> tuple[Row, ...]:

@@ -82,6 +82,13 @@ def test_files_are_written(diagram, folder):
     assert (folder / "fig3a.png").read_bytes().startswith(FORMAT)
 
 
+def test_a_diagram_is_short_in_print_and_draws_itself(diagram, tmp_path):
+    """As records do."""
+    assert repr(diagram).startswith(f"PhaseDiagram(fig3a, {len(diagram.rows)} cases, ")
+    assert diagram.plot(tmp_path / "x.png").axes
+    assert (tmp_path / "x.png").read_bytes().startswith(FORMAT)
+
+
 def test_table_of_cases_holds_every_case_once(diagram, folder):
     """By the parameters' Python names, with label, moment and slope at pi."""
     table_of = rows_of(folder / "cases.csv")
