@@ -2,8 +2,11 @@
 
     scene = der.Scene(der.circle(), der.rectangular_section(h_over_t=4))
     path = der.fold(scene)   # arrays gamma, moment, energy, index; points; at_pi; mode
+    path.save("path.json")
+    path.plot("path.png")
 
-Names are imported when they are first used, so that ``import der`` costs nothing.
+A function takes a scene, or a ring, and returns a record. Names are imported when they are first
+used, so that ``import der`` costs nothing.
 """
 
 from importlib import import_module
@@ -23,17 +26,18 @@ if TYPE_CHECKING:
     from der.bvp.solve import solve_bvp
     from der.continuation.arclength import follow
     from der.continuation.events import Events
-    from der.diagram.diagram import phase_diagram
-    from der.errors import Interrupted, NotConverged
-    from der.geometry.ring import Ring, circle, ellipse, profile, rectangle, triangle
+    from der.diagram.diagram import PhaseDiagram, phase_diagram
+    from der.errors import Interrupted, NotConverged, Reason
+    from der.geometry.ring import Ring
     from der.geometry.section import Scale, Section, rectangular_section, section
+    from der.geometry.shapes import circle, ellipse, profile, rectangle, triangle
     from der.problem import Options
-    from der.records.comparison import Comparison
+    from der.records.comparison import ComparedPoint, ComparedState, Comparison
     from der.records.configurations import Shapes
     from der.records.energy_surface import Surface
-    from der.records.landscape import BarrierCurves, Landscape, Pass
-    from der.records.opening import LeastPush
-    from der.records.path import Path, Point
+    from der.records.landscape import BarrierCurves, Barriers, Landscape, Pass, Rest, Saddle
+    from der.records.opening import Instant, LeastPush, Push
+    from der.records.path import AtPi, Mode, Path, Point, Timing
     from der.records.planar import PlanarState, PlanarStates, Squeeze, SqueezePoint
     from der.records.states import RingState, States, Transition
     from der.rod.rod import discrete_rod, straight
@@ -41,109 +45,62 @@ if TYPE_CHECKING:
     from der.rod.system import RodSystem
     from der.scene import Scene
 
-__all__ = [
-    "BarrierCurves",
-    "Comparison",
-    "Events",
-    "Interrupted",
-    "Landscape",
-    "LeastPush",
-    "NotConverged",
-    "Options",
-    "Pass",
-    "Path",
+# type checkers want literal lists: the statement, the functions, the records, what can go wrong
+__all__ = ["Ring", "Scale", "Scene", "Section", "circle", "ellipse", "profile", "rectangle"]
+__all__ += ["Events", "Options", "RodSystem", "discrete_rod", "follow", "straight", "supported"]
+__all__ += ["__version__", "rectangular_section", "section", "triangle"]
+__all__ += ["barrier", "compare", "energy_surface", "fold", "landscape", "least_push"]
+__all__ += ["packing_ratio", "phase_diagram", "planar", "solve_bvp", "squeeze", "states"]
+__all__ += ["AtPi", "BarrierCurves", "Barriers", "ComparedPoint", "ComparedState", "Comparison"]
+__all__ += ["Instant", "Landscape", "LeastPush", "Mode", "Pass", "Path", "PhaseDiagram"]
+__all__ += [
     "PlanarState",
     "PlanarStates",
     "Point",
-    "Ring",
+    "Push",
+    "Rest",
     "RingState",
-    "RodSystem",
-    "Scale",
-    "Scene",
-    "Section",
+    "Saddle",
     "Shapes",
     "Squeeze",
-    "SqueezePoint",
-    "States",
-    "Surface",
-    "Transition",
-    "__version__",
-    "barrier",
-    "circle",
-    "compare",
-    "discrete_rod",
-    "ellipse",
-    "energy_surface",
-    "fold",
-    "follow",
-    "landscape",
-    "least_push",
-    "packing_ratio",
-    "phase_diagram",
-    "planar",
-    "profile",
-    "rectangle",
-    "rectangular_section",
-    "section",
-    "solve_bvp",
-    "squeeze",
-    "states",
-    "straight",
-    "supported",
-    "triangle",
 ]
+__all__ += ["SqueezePoint", "States", "Surface", "Timing", "Transition"]
+__all__ += ["Interrupted", "NotConverged", "Reason"]
 
-# where each public name lives
-_HOME = {
-    "follow": ("der.continuation.arclength", "follow"),
-    "Events": ("der.continuation.events", "Events"),
-    "Options": ("der.problem", "Options"),
-    "RodSystem": ("der.rod.system", "RodSystem"),
-    "discrete_rod": ("der.rod.rod", "discrete_rod"),
-    "straight": ("der.rod.rod", "straight"),
-    "supported": ("der.rod.supports", "supported"),
-    "compare": ("der.analysis.compare", "compare"),
-    "fold": ("der.analysis.fold", "fold"),
-    "barrier": ("der.analysis.landscape.barrier", "barrier"),
-    "landscape": ("der.analysis.landscape.landscape", "landscape"),
-    "least_push": ("der.analysis.landscape.opening", "least_push"),
-    "energy_surface": ("der.analysis.landscape.surface", "energy_surface"),
-    "states": ("der.analysis.multistability.states", "states"),
-    "planar": ("der.analysis.planar.planar_states", "planar"),
-    "squeeze": ("der.analysis.planar.squeeze", "squeeze"),
-    "packing_ratio": ("der.bvp.packing", "packing_ratio"),
-    "solve_bvp": ("der.bvp.solve", "solve_bvp"),
-    "phase_diagram": ("der.diagram.diagram", "phase_diagram"),
-    "Ring": ("der.geometry.ring", "Ring"),
-    "circle": ("der.geometry.ring", "circle"),
-    "ellipse": ("der.geometry.ring", "ellipse"),
-    "profile": ("der.geometry.ring", "profile"),
-    "rectangle": ("der.geometry.ring", "rectangle"),
-    "triangle": ("der.geometry.ring", "triangle"),
-    "Scale": ("der.geometry.section", "Scale"),
-    "Section": ("der.geometry.section", "Section"),
-    "rectangular_section": ("der.geometry.section", "rectangular_section"),
-    "section": ("der.geometry.section", "section"),
-    "Comparison": ("der.records.comparison", "Comparison"),
-    "Shapes": ("der.records.configurations", "Shapes"),
-    "Surface": ("der.records.energy_surface", "Surface"),
-    "BarrierCurves": ("der.records.landscape", "BarrierCurves"),
-    "Landscape": ("der.records.landscape", "Landscape"),
-    "Pass": ("der.records.landscape", "Pass"),
-    "LeastPush": ("der.records.opening", "LeastPush"),
-    "Path": ("der.records.path", "Path"),
-    "Point": ("der.records.path", "Point"),
-    "PlanarState": ("der.records.planar", "PlanarState"),
-    "PlanarStates": ("der.records.planar", "PlanarStates"),
-    "Squeeze": ("der.records.planar", "Squeeze"),
-    "SqueezePoint": ("der.records.planar", "SqueezePoint"),
-    "RingState": ("der.records.states", "RingState"),
-    "States": ("der.records.states", "States"),
-    "Transition": ("der.records.states", "Transition"),
-    "Scene": ("der.scene", "Scene"),
-    "Interrupted": ("der.errors", "Interrupted"),
-    "NotConverged": ("der.errors", "NotConverged"),
+_NAMES = {  # by the module where they live
+    "der.analysis.compare": "compare",
+    "der.analysis.fold": "fold",
+    "der.analysis.landscape.barrier": "barrier",
+    "der.analysis.landscape.landscape": "landscape",
+    "der.analysis.landscape.opening": "least_push",
+    "der.analysis.landscape.surface": "energy_surface",
+    "der.analysis.multistability.states": "states",
+    "der.analysis.planar.planar_states": "planar",
+    "der.analysis.planar.squeeze": "squeeze",
+    "der.bvp.packing": "packing_ratio",
+    "der.bvp.solve": "solve_bvp",
+    "der.continuation.arclength": "follow",
+    "der.continuation.events": "Events",
+    "der.diagram.diagram": "PhaseDiagram phase_diagram",
+    "der.errors": "Interrupted NotConverged Reason",
+    "der.geometry.ring": "Ring",
+    "der.geometry.section": "Scale Section rectangular_section section",
+    "der.geometry.shapes": "circle ellipse profile rectangle triangle",
+    "der.problem": "Options",
+    "der.records.comparison": "ComparedPoint ComparedState Comparison",
+    "der.records.configurations": "Shapes",
+    "der.records.energy_surface": "Surface",
+    "der.records.landscape": "BarrierCurves Barriers Landscape Pass Rest Saddle",
+    "der.records.opening": "Instant LeastPush Push",
+    "der.records.path": "AtPi Mode Path Point Timing",
+    "der.records.planar": "PlanarState PlanarStates Squeeze SqueezePoint",
+    "der.records.states": "RingState States Transition",
+    "der.rod.rod": "discrete_rod straight",
+    "der.rod.supports": "supported",
+    "der.rod.system": "RodSystem",
+    "der.scene": "Scene",
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:
@@ -153,8 +110,7 @@ def __getattr__(name: str) -> Any:
         return version("ring-origami")
     if name not in _HOME:
         raise AttributeError(f"module 'der' has no attribute {name!r}")
-    module, public = _HOME[name]
-    value = globals()[name] = getattr(import_module(module), public)
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
     return value
 
 

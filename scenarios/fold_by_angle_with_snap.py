@@ -1,8 +1,8 @@
-"""Turn the grips of a ring up to pi and back: at h/t = 1.6 it snaps on both ways.
+"""Turn the grips of a ring up to pi and back: at h/t = 1.6 it snaps both ways.
 
-With the angle controlled the state follows its minimum of energy until that ceases to exist, at a
-fold; then the ring snaps, here by dynamic relaxation, to another equilibrium at the same angle.
-Loading and unloading snap at different folds: the loop between them is what the snaps release.
+Where the angle is controlled, the state follows its minimum of energy until that ends at a fold.
+Then the ring snaps to another equilibrium at the same angle, here by dynamic relaxation. Loading
+and unloading snap at different folds; the work of the loop between them is what the snaps release.
 
     python -m scenarios.fold_by_angle_with_snap [DIR]
 

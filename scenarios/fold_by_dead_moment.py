@@ -1,8 +1,8 @@
-"""Hang a growing weight on the grips of a ring, h/t = 4, and take it off again.
+"""Load the grips of a ring, h/t = 4, by a growing dead moment, and unload them again.
 
-The moment is dead: it stays what it is while gamma moves. At its first limit the ring snaps through
-to its stop at gamma = pi, folded; taken off, the folded ring stays, held by itself, down to a small
-moment the other way, where it pops open.
+A dead moment keeps its value while gamma moves. At its first limit the ring snaps through to the
+stop at gamma = pi, folded. Unloaded, the ring stays folded down to a small negative moment, at
+which it snaps open.
 
     python -m scenarios.fold_by_dead_moment [DIR]
 

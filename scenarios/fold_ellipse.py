@@ -1,8 +1,8 @@
-"""Fold an ellipse, b/a = 0.6, h/t = 4: about its short axis it folds, about its long one not.
+"""Fold an ellipse, b/a = 0.6, h/t = 4: about its short axis it folds, about its long axis not.
 
 Twisted by grips at the ends of its short axis ("about x") the ring turns into three loops and stays
-so; by grips at the ends of the long axis it is still full of moment at gamma = pi. The ring and the
-folded shape are the same: only the way there differs (paper, Fig. 4).
+folded. Twisted by grips at the ends of its long axis, it still has a large moment at gamma = pi.
+The ring and its folded shape are the same; only the path differs (paper, Fig. 4).
 
     python -m scenarios.fold_ellipse [DIR]
 

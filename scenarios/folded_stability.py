@@ -1,14 +1,14 @@
-"""Above which h/t a folded ring is stable: in its grips, under a moment, left alone.
+"""The h/t above which a folded ring is stable: in its grips, at fixed moment, when released.
 
 The planar three-covered shape does not depend on the section, and its forces are proportional to
 EI1. So one shape of a ring serves every h/t, and each index, and the slope dM/dgamma, is a function
-of h/t whose last change of sign is a threshold: stable above. Leaving a ring alone sets free what
-the grips held: its index is never below that under a moment.
+of h/t whose last change of sign is a threshold: stable above. Releasing a ring frees what the grips
+held, so its index is never below that at fixed moment.
 
     python -m scenarios.folded_stability [--out DIR] [--quick]
 
-writes thresholds.csv to DIR (default: out/folded_stability): on 64 and 128 edges, and extrapolated
-to none, which is to be trusted to about a tenth of its distance from the finer mesh.
+writes thresholds.csv to DIR (default: out/folded_stability): on 64 and 128 edges, and extrapolated;
+the error of the extrapolated value is about a tenth of its distance from the finer mesh.
 """
 
 from __future__ import annotations
@@ -95,11 +95,11 @@ class Folded:
         return ring.arm_moment(at.slope)
 
     def index_moment(self, h_over_t: float) -> int:
-        """Index under a moment."""
+        """Index at fixed moment."""
         return self.index(h_over_t) + (self.slope(h_over_t) < 0.0)
 
     def alone(self, h_over_t: float) -> tuple[RodSystem, State]:
-        """The full ring without grips, and the state with the forces that close it."""
+        """The released ring, and the state with the forces that close it."""
         section = der.rectangular_section(h_over_t)
         own = gripped_ring(self.ring, section, self.n_edges)
         full = gripped_ring(self.ring, section, self.n_edges, name="full")
@@ -111,13 +111,13 @@ class Folded:
         return free, at.state if at.converged else start
 
     def index_free(self, h_over_t: float) -> int:
-        """Index of the ring left alone."""
+        """Index of the released ring."""
         free, state = self.alone(h_over_t)
         count = free.index(state)
         return -1 if count is None else count  # at a threshold, to rounding
 
     def softest_free(self, h_over_t: float, count: int = 3) -> list[float]:
-        """Stiffnesses nearest to zero of the ring left alone [GJ/a^2]."""
+        """Stiffnesses nearest to zero of the released ring [GJ/a^2]."""
         free, state = self.alone(h_over_t)
         return free.softest_modes(state, count)[0].tolist()
 

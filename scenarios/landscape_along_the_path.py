@@ -1,9 +1,9 @@
-"""What it costs to fold a circular ring and to open it again, over h/t: 40 landscapes.
+"""Energy barriers to fold a circular ring and to open it again, over h/t: 40 landscapes.
 
-A folded circle is a well from h/t = 3.469928 on. There the barrier to open it vanishes like the
-square of the distance from the threshold: the saddle comes out of the folded state in a pitchfork,
-M = s d - c d^3 with d = pi - gamma, and is s^2/c high. The barrier to fold it exceeds that to open
-it by the energy of the folded ring, 4 pi alpha.
+A folded circle is a well from h/t = 3.469928 on. At this threshold the barrier to open it is zero,
+and grows like the square of the distance from it: the saddle leaves the folded state in a
+pitchfork, M = s d - c d^3 with d = pi - gamma, and its height is s^2/c. The barrier to fold is
+larger than that to open by the energy of the folded ring, 4 pi alpha.
 
     python -m scenarios.landscape_along_the_path [DIR]
 
@@ -16,9 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.analysis.landscape.landscape import landscape
 from der.analysis.landscape.over_thickness import barriers_over
-from scenarios.output import folder, usage
+from scenarios.output import folder, keep, usage
 
 if __name__ == "__main__":
     usage(__file__, __doc__)
@@ -26,7 +25,7 @@ if __name__ == "__main__":
 H_OVER_T = np.geomspace(1.0, 30.0, 40)
 BESIDE = (3.55, 3.6, 3.7, 3.8)  # sections beside the threshold, from which it is extrapolated
 
-one = landscape(der.Scene(der.circle(), der.rectangular_section(8.0), error_bars=True))
+one = der.landscape(der.Scene(der.circle(), der.rectangular_section(8.0), error_bars=True))
 curves = barriers_over(der.circle(), H_OVER_T)
 
 
@@ -36,10 +35,8 @@ threshold = float(np.polyval(np.polyfit(np.sqrt(beside.open), BESIDE, 3), 0.0))
 
 if __name__ == "__main__":
     place = folder("landscape_along_the_path")
-    one.save(place / "landscape.json")
-    one.plot(place / "landscape.png")
-    curves.save(place / "barriers.json")
-    curves.plot(place / "barriers.png")
+    keep(one, place, "landscape")
+    keep(curves, place, "barriers")
     for name in ("fold", "open"):
         value, error = one.extrapolated[name]
         print(f"h/t = 8: to {name} {value:.5f} +- {error:.0e} GJ/a")

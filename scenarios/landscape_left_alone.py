@@ -1,9 +1,10 @@
-"""How easily a folded ring opens that is left alone: ellipse, b/a = 0.6, over h/t.
+"""How easily a released folded ring opens: ellipse, b/a = 0.6, over h/t.
 
-In grips that turn freely the folded ellipse sits behind a barrier that the path of twisting shows.
-Left alone it need not open the way it was folded: a saddle without that symmetry is far lower. At
-h/t = 4 it takes 0.01068 GJ/a instead of 0.6713; below h/t = 3.636 nothing holds the ring at all,
-where twisting shows a well down to 2.197. A circle's saddle is the same with and without grips.
+In grips that turn freely, the folded ellipse is behind an energy barrier that the path of twisting
+shows. Released, it need not open the way it was folded: a saddle without that symmetry is far
+lower. At h/t = 4 the barrier is 0.01068 GJ/a instead of 0.6713. Below h/t = 3.636 the released ring
+opens by itself, where twisting shows a well down to 2.197. A circle's saddle is the same with and
+without grips.
 
     python -m scenarios.landscape_left_alone [DIR]
 
@@ -16,10 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.analysis.landscape.barrier import barrier
-from der.analysis.landscape.landscape import landscape
 from der.analysis.landscape.over_thickness import barriers_over
-from scenarios.output import folder, usage
+from scenarios.output import folder, keep, usage
 
 if __name__ == "__main__":
     usage(__file__, __doc__)
@@ -28,17 +27,15 @@ H_OVER_T = np.geomspace(1.8, 30.0, 24)
 ring = der.ellipse(b_over_a=0.6)
 
 scene = der.Scene(ring, der.rectangular_section(4.0), error_bars=True)
-twisted = landscape(scene)
-found = barrier(scene)
+twisted = der.landscape(scene)
+found = der.barrier(scene)
 
 if __name__ == "__main__":
     place = folder("landscape_left_alone")
-    found.save(place / "pass.json")
-    found.plot(place / "pass.png")
+    keep(found, place, "pass")
     curves = barriers_over(ring, H_OVER_T, free=True)
-    curves.save(place / "barriers.json")
-    curves.plot(place / "barriers.png")
-    for name, one in (("left alone", found), ("by twisting", twisted)):
+    keep(curves, place, "barriers")
+    for name, one in (("released", found), ("by twisting", twisted)):
         value, error = one.extrapolated["open"]
-        print(f"to open {name}: {value:.5f} +- {error:.0e} GJ/a")
+        print(f"to open, {name}: {value:.5f} +- {error:.0e} GJ/a")
     print(f"written to {place}")

@@ -1,9 +1,9 @@
 """A fold of the path is a double well in the distance of the grips: circle, h/t = 1.6.
 
-Prescribe the distance of the grips besides their rotation, and the state is a single-valued
-function of both: over the plane (gamma, d) the energy is one smooth sheet. Between the two folds of
-the path it has two valleys at the same gamma, a near and a far one, and the unstable branch is the
-ridge between them; at either fold a valley ends, and the ring snaps across.
+Where the distance of the grips is prescribed besides their rotation, the state is a single-valued
+function of both: over the plane (gamma, d) the energy is one smooth surface. Between the two folds
+of the path it has two valleys at the same gamma, and the unstable branch is the ridge between them.
+At each fold one of the valleys ends, and the ring snaps to the other.
 
     python -m scenarios.landscape_over_twist_and_distance [DIR]
 
@@ -15,13 +15,12 @@ from __future__ import annotations
 import numpy as np
 
 import der
-from der.analysis.landscape.surface import energy_surface
-from scenarios.output import folder, usage
+from scenarios.output import folder, keep, usage
 
 if __name__ == "__main__":
     usage(__file__, __doc__)
 
-sheet = energy_surface(der.Scene(der.circle(), der.rectangular_section(1.6)), shape=(48, 48))
+sheet = der.energy_surface(der.Scene(der.circle(), der.rectangular_section(1.6)), shape=(48, 48))
 
 
 def valleys(energy: np.ndarray) -> int:
@@ -37,8 +36,7 @@ least = [float(sheet.energy[:, j].min()) for j in range(len(sheet.distance))]
 
 if __name__ == "__main__":
     place = folder("landscape_over_twist_and_distance")
-    sheet.save(place / "surface.json")
-    sheet.plot(place / "surface.png")
+    keep(sheet, place, "surface")
     print(f"{sheet.energy.size} cells in {sheet.solve_s:.1f} s, {np.sum(sheet.count == 0)} empty")
     print(f"valleys before the folds {set(before)}, between them {set(between)}")
     print(f"written to {place}")

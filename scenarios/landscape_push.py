@@ -1,11 +1,11 @@
-"""Pushing a folded ring open with the least work: circle and ellipse, b/a = 0.6, h/t = 4.
+"""Opening a folded ring with the least work: circle and ellipse, b/a = 0.6, h/t = 4.
 
-No slow push of a strut or a pair of wrenches takes less than the barrier of the ring left alone. It
-takes just that where it leads to the pass without a snap: a circle by a strut between two strands
-that lie in each other, a third of the ring apart, which lifts one off the other; an ellipse by
-wrenches at the ends of its long axis, which turn against each other across the line between them.
-A dead load gets away earlier, after 0.0037 of 0.0211 GJ/a where a circle is squeezed along a
-diameter of its folded shape; from there on it works by itself.
+A strut or a pair of couples that loads the ring slowly does at least the work of the barrier of the
+released ring. It does just that where it leads to the saddle without a snap. For a circle, this is
+a strut between two strands that lie in each other, a third of the ring apart: it lifts one off the
+other. For an ellipse, couples at the ends of the long axis turn against each other, across the line
+between them. A dead load does less work until the ring snaps open: 0.0037 of 0.0211 GJ/a where a
+circle is squeezed along a diameter of its folded shape.
 
     python -m scenarios.landscape_push [DIR]
 
@@ -20,9 +20,8 @@ import math
 import der
 from der.analysis.landscape.actuators import struts
 from der.analysis.landscape.barrier import ALIKE, twisted_rests
-from der.analysis.landscape.opening import least_push
 from der.analysis.landscape.opening_path import opened
-from scenarios.output import folder, usage
+from scenarios.output import folder, keep, usage
 
 if __name__ == "__main__":
     usage(__file__, __doc__)
@@ -37,9 +36,8 @@ lifted = opened(lift, rests[-1].energy, ALIKE * rests[-1].energy)
 if __name__ == "__main__":
     place = folder("landscape_push")
     for ring, n_edges in ((der.circle(), 96), (der.ellipse(b_over_a=0.6), 128)):
-        found = least_push(der.Scene(ring, SECTION, n_edges=n_edges, error_bars=True))
-        found.save(place / f"push_{ring.shape}.json")
-        found.plot(place / f"push_{ring.shape}.png")
+        found = der.least_push(der.Scene(ring, SECTION, n_edges=n_edges, error_bars=True))
+        keep(found, place, f"push_{ring.shape}")
         for kind in found.least:
             value, error = found.extrapolated.get(kind, (math.nan, math.nan))
             slow, dead = found.pushes[found.least[kind]], found.pushes[found.least_dead[kind]]

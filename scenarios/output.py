@@ -10,6 +10,7 @@ from pathlib import Path as File
 from typing import NoReturn
 
 import der
+from der.records.record import Record
 
 
 class Arguments(argparse.ArgumentParser):
@@ -66,6 +67,12 @@ def folder(name: str) -> File:
     return place
 
 
+def keep(record: Record, place: File, stem: str) -> None:
+    """Write a record and its picture to STEM.json and STEM.png in a folder."""
+    record.save(place / f"{stem}.json")
+    record.plot(place / f"{stem}.png")
+
+
 def write(path: der.Path, name: str, *, stem: str = "path") -> None:
     """Write STEM.json, shapes.npz, STEM.png and STEM.rrd, and say so.
 
@@ -75,11 +82,10 @@ def write(path: der.Path, name: str, *, stem: str = "path") -> None:
     from der.viz.rerun.recording import save_recording
 
     place = folder(name)
-    path.save(place / f"{stem}.json")
+    keep(path, place, stem)
     if path.shapes is not None:
         path.shapes.save(place / ("shapes.npz" if stem == "path" else f"{stem}.npz"))
         save_recording(path, place / f"{stem}.rrd")
-    path.plot(place / f"{stem}.png")
     print(summary(path))
     print(f"written to {place}")
 

@@ -1,10 +1,10 @@
-"""Fold 500 rings at random in every way there is, and list the stops that nobody has explained.
+"""Fold 500 random rings under every control, and list the paths that end without explanation.
 
-Rings and sections of the ranges of the paper's phase diagrams are
-followed by the arc length, turned up and down by the angle, and loaded by a dead moment. A stop
-that says what the ring does, where it breaks a symmetry that the sector keeps or its path leads
-back beyond -pi, is an answer; any other is a defect of the solver. Followed paths are held against
-the work done, too: U is the integral of 4 M dgamma.
+Rings and sections are drawn from the ranges of the paper's phase diagrams. Their paths are followed
+by arclength, loaded and unloaded by the angle, and loaded by a dead moment. A path may end early
+because of what the ring does: a mode breaks the symmetry that the sector keeps, or gamma turns back
+and the path leads to -pi. Any other early end is a defect of the solver. The energy of paths
+followed by arclength is also compared with the work done, the integral of 4 M dgamma.
 
     python -m scenarios.random_folds [--count N] [--seed N] [--edges N] [--out DIR]
 

@@ -2,13 +2,13 @@
 
 The paper follows a quarter or a half of the ring, which breaks no symmetry, and calls a folded ring
 stable where dM/dgamma > 0. Here every curve of the paper and the planes of profile and section
-around them are followed with the index of the full ring, and each ring's grips are turned up by the
-angle, too, so that it snaps where it has to. Four ways of being wrong are looked for:
+around them are followed with the index of the full ring. Each ring is also loaded by the angle, so
+that it snaps where it has to. Four ways of being wrong are looked for:
 
-    a  a state that turning the grips up from flat reaches has a way down with the grips held
-    b  the folded state has one under a moment, although its slope is positive
-    c  the folded state has one with the grips removed, although its slope is positive
-    d  at pi the ring rests without a moment but is not folded: it is flat and inside out
+    a  a state that loading by the angle reaches is unstable in the grips
+    b  the folded state is unstable at fixed moment, although its slope is positive
+    c  the folded state is unstable when released, although its slope is positive
+    d  at pi the ring has no moment but is not folded: it is flat and inside out
 
     python -m scenarios.stability_beyond_symmetry [--out DIR] [--edges N] [--quick]
 
@@ -36,13 +36,13 @@ HEIGHTS = (1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0
 COLOURS = {
     "not folded": "#dddddd",
     "slope < 0": "#E69F00",
-    "slope > 0, unstable alone": "#D55E00",
+    "slope > 0, unstable released": "#D55E00",
     "stable": "#0072B2",
     "stuck": "#000000",
 }
 MARKS = {
     "a": ("o", "a: reached, unstable in the grips"),
-    "b": ("D", "b: unstable under a moment"),
+    "b": ("D", "b: unstable at fixed moment"),
     "d": ("^", "d: inside out"),
 }
 
@@ -90,7 +90,7 @@ class Verdict:
             return "not folded"
         if not self.slope_positive:
             return "slope < 0"
-        return "stable" if self.index_free == 0 else "slope > 0, unstable alone"
+        return "stable" if self.index_free == 0 else "slope > 0, unstable released"
 
 
 def curves() -> Iterator[Case]:

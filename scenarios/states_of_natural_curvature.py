@@ -1,10 +1,10 @@
 r"""The states of a circular ring, free in space, over its natural curvature: h/t = 2.
 
-A bar bent to a circle of curvature kappa0 and joined to a ring of curvature 1 may lie flat, cover
-itself twice or three times, be turned inside out or lie in a figure eight, at any kappa0: all are
-states, with the energies pi alpha (n - kappa0)^2 of n covers and that of a planar elastica. How
-many ways lead down from them changes at thresholds that are known in closed form (`ways_down`); the
-states in space between them are not, and are found.
+A rod of natural curvature kappa0 is bent to a ring of curvature 1. It may lie flat, be two-covered
+or three-covered, be turned inside out or lie in a figure eight, at any kappa0. All are states, with
+the energies pi alpha (n - kappa0)^2 of n covers and that of a planar elastica. Their index changes
+at thresholds that are known in closed form (`continuum_index`); the states in space between them
+are not, and are found.
 
     python -m scenarios.states_of_natural_curvature [DIR]
 
@@ -25,7 +25,7 @@ import numpy as np
 import der
 from der.analysis.multistability.initial_guesses import covered
 from der.rod.gripped_ring import gripped_ring
-from scenarios.output import folder, usage, write_table
+from scenarios.output import folder, keep, usage, write_table
 
 if __name__ == "__main__":
     usage(__file__, __doc__)
@@ -40,7 +40,7 @@ SHOWN = (0.0, 1.0, 2.0, 3.0)  # natural curvatures of which all is drawn
 bar = der.rectangular_section(H_OVER_T)
 
 
-def ways_down(n: int, kappa0: float, alpha: float, beta: float) -> int:
+def continuum_index(n: int, kappa0: float, alpha: float, beta: float) -> int:
     """Index of the n-covered circle in the continuum.
 
     In Fourier mode m, rotations (a2 cos m s, a3 sin m s) about d2 and d3, the second variation is
@@ -86,8 +86,8 @@ def thresholds(n: int, index: Callable[[int, float], int]) -> Iterator[float]:
 
 
 def in_the_continuum(n: int, kappa0: float) -> int:
-    """`ways_down` of the bar at hand."""
-    return ways_down(n, kappa0, bar.alpha, bar.beta)
+    """`continuum_index` of this section."""
+    return continuum_index(n, kappa0, bar.alpha, bar.beta)
 
 
 def states_at(kappa0: float, count: int = 12) -> der.States:
@@ -115,8 +115,7 @@ def main() -> None:
         sweep.append((kappa0, one))
         print(f"natural curvature {kappa0:g}: {len(one)} states, {len(one.minima)} minima")
         if kappa0 in SHOWN:
-            one.save(place / f"states_{kappa0:g}.json")
-            one.plot(place / f"states_{kappa0:g}.png")
+            keep(one, place, f"states_{kappa0:g}")
     write_table(
         place / "states.csv",
         ["natural_curvature", "name", "energy", "index", "needs_cut"],

@@ -75,7 +75,7 @@ def wedge(case):
 
 def along(solve, batch):
     """In place of following a slice: one point of a curve, and a row."""
-    from der.diagram.boundaries import Boundaries
+    from der.diagram.curves.slices import Boundaries
     from der.diagram.scanned_boundaries import BoundaryPoint, Curve
 
     (task,) = batch

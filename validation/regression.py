@@ -29,6 +29,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Cases = Iterator[tuple[str, Callable[[], Any]]]  # names, and what returns the record
@@ -227,19 +229,20 @@ def entries(make: Callable[[], Any]) -> Any:
 
 CLOSE = 1e-9  # of the largest value of a column
 LEAST = 1e-3  # in place of that value where it is smaller: such a column is all rounding
+CONTACT = 1e-5  # likewise, where strands pass through each other: such points are bisected to that
 BARS = 0.1  # of an estimated error, where it changes by more than CLOSE
 CORNER = 1e-7  # of the sides of a diagram
-# A boundary is known to 1e-8, at worst 4e-6, but in points only, which may shift along it. Half way
-# between two of them a chord is off a smooth curve by a quarter of what the chord between the
-# neighbours of a point is off that point; twice as much is allowed, for uneven distances.
-CURVE, CHORD = 1e-6, 0.5
+# A boundary is known to 1e-8, at worst 4e-6, but in points only, and these may shift along it. So
+# points are held against the splines through the others: those from cells twice as wide, other
+# points of the same curves, are at most 5e-6 off (figs. 3a, 5c, 8c).
+CURVE = 2e-5  # of the sides of a diagram
 STATES = {"gamma", "moment", "energy", "index", "index_moment", "x", "frames"}  # columns of a path
 STATES |= {"distance", "force", "force_error", "energy_error"}  # and of a squeezed ring
 NOT_JUDGED = {
     *("timing", "version", "tried", "nowhere", "force_evaluations", "residual", "intervals"),
     *("message", "how", "why", "position", "curve", "way", "path", "snaps"),
 }
-SIZES = ("value", "error", "curve", "corner")
+SIZES = ("value", "contact", "error", "curve", "corner")
 Leaf = tuple[Any, str, bool]  # a value, its column, and whether it is an error of such values
 
 
@@ -288,8 +291,13 @@ def judged(old_file: File, new_file: File) -> Iterator[Found]:
             scale[column] = max(scale[column], abs(value))
     scale["slope"] = max(scale["slope"], scale["moment"])
     there = dict(leaves(asked(new)))
+    points = [point["kind"] for point in old.get("points", [])]
+    contacts = tuple(f"points[{k}]." for k, kind in enumerate(points) if kind == "contact")
     for place, leaf in leaves(asked(old)):
-        yield judged_leaf(place, leaf, there.get(place), scale[leaf[1]])
+        one = judged_leaf(place, leaf, there.get(place), scale[leaf[1]])
+        if one.kind == "value" and place.startswith(contacts):
+            one = one._replace(kind="contact", allowed=CONTACT)
+        yield one
 
 
 def judged_leaf(place: str, old: Leaf, new: Leaf | None, scale: float) -> Found:
@@ -344,6 +352,7 @@ def asked(record: dict[str, Any]) -> dict[str, Any]:
 # --- Diagrams --------------------------------------------------------------------------------
 
 PLACE = ("b_over_a", "r_over_a", "vertex_angle", "natural_curvature", "h_over_t")
+FINE = 32  # a chord is then 1/1024 as far off as that of an interval
 Row = Mapping[str, str]
 Lines = Mapping[str, list[Array]]  # points (n, 5) of curves, in units of the sides, by kind
 
@@ -384,14 +393,28 @@ def lines_of(rows: Sequence[Row], sides: Array) -> Lines:
 
 
 def off_lines(ours: Lines, theirs: Lines, none: Found) -> Iterator[Found]:
-    """How far points of curves are from curves of their kind."""
-    for kind, line in [(kind, line) for kind, lines in ours.items() for line in lines]:
-        for k, point in enumerate(line):
-            size = min((off(point, other) for other in theirs.get(kind, [])), default=math.inf)
-            inner = 0 < k < len(line) - 1
-            allowed = none.allowed + (CHORD * off(point, line[[k - 1, k + 1]]) if inner else 0.0)
+    """How far points of curves are from the smooth curves of their kind."""
+    for kind, lines in ours.items():
+        points = np.concatenate(lines)
+        others = [spline(line) for line in theirs.get(kind, [])]
+        owner = np.repeat(np.arange(len(others)), [len(line) for line in others])
+        nearest = cKDTree(np.concatenate(others)).query(points)[1] if others else []
+        sizes = [off(point, others[owner[k]]) for point, k in zip(points, nearest, strict=False)]
+        for point, size in zip(points, sizes or [math.inf] * len(points), strict=True):
             words = f"{kind} at {point.round(6).tolist()} of the sides {none.words}: {size:.1e} off"
-            yield Found(none.kind, size, allowed, words)
+            yield none._replace(size=size, words=words)
+
+
+def spline(line: Array) -> Array:
+    """Polyline of `FINE` pieces an interval, close to the cubic spline through a curve's points."""
+    step = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    line = line[np.append(True, step > 0.0)]
+    along = np.append(0.0, np.cumsum(step[step > 0.0]))
+    if len(line) < 3:
+        return line
+    places = np.interp(np.arange(FINE * (len(line) - 1) + 1) / FINE, np.arange(len(line)), along)
+    points: Array = CubicSpline(along, line)(places)
+    return points
 
 
 def off(point: Array, line: Array) -> float:

@@ -10,7 +10,7 @@ tangent: no interpolation. Folds and limits are compared one by one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -29,7 +29,7 @@ FAR = 0.05  # of the scaled plane; what lies farther apart belongs to another br
 
 def compare(
     scene: Scene,
-    rod: Path,
+    rod: Path | None = None,
     *,
     tolerance: float = TOLERANCE,
     progress: Callable[[float], object] | None = None,
@@ -39,17 +39,22 @@ def compare(
     Parameters
     ----------
     scene : what was folded, by arc length.
-    rod : its path, from `der.fold`; with error bars (`Scene.error_bars`) to say whether it agrees.
-    tolerance : of the boundary-value problem, see `solve`.
-    progress : called with gamma [rad] after every state of the boundary-value problem.
+    rod : its path, where `der.fold` has found it already. With error bars (`Scene.error_bars`) it
+        is said whether both agree.
+    tolerance : of the boundary-value problem, see `solve_bvp`.
+    progress : called with gamma [rad] after every state of either path.
 
     Raises
     ------
     ValueError
         For a scene that the boundary-value solver cannot do, or a path that is not of a rod.
     NotConverged
-        Where the boundary-value problem's path cannot be followed to its end.
+        Where a path cannot be followed to its end.
     """
+    if rod is None:
+        from der.analysis.fold import fold
+
+        rod = fold(scene, progress=progress)
     if rod.solver != "der":
         raise ValueError(f"rod must be a path of a rod (solver 'der'), got {rod.solver!r}")
     wanted = replace(
@@ -59,14 +64,13 @@ def compare(
         save_at=tuple(sorted({g for g in rod.gamma.tolist() if 0.0 <= g <= _last(scene)})),
     )
     bvp, points = solve_with_points(wanted, tolerance=tolerance, progress=progress)
-    scales = (float(np.abs(bvp.moment).max()), float(np.abs(bvp.energy).max()))
-    kinds = {point.position: point.kind for point in rod.points}
+    scales = {name: float(np.abs(getattr(bvp, name)).max()) for name in ("moment", "energy")}
+    folds = {point.position for point in rod.folds}
     regular = [point for point in points if point.kind != "fold"]
     states = [
         found
         for k in range(len(rod))
-        if kinds.get(k) != "fold"
-        and (found := _state(rod, k, kinds.get(k, ""), regular, scales, tolerance)) is not None
+        if k not in folds and (found := _state(rod, k, regular, scales, tolerance)) is not None
     ]
     pairs, alone = _pairs(rod, bvp)
     missing = len(rod) - len(rod.folds) - len(states)
@@ -78,62 +82,58 @@ def _last(scene: Scene) -> float:
 
 
 def _state(
-    rod: Path,
-    k: int,
-    kind: str,
-    points: list[Point],
-    scales: tuple[float, float],
-    tolerance: float,
+    rod: Path, k: int, points: Sequence[Point], scales: Mapping[str, float], tolerance: float
 ) -> ComparedState | None:
     """State k of the rod beside the solution at its gamma that is nearest in M and U."""
-    gamma, moment, energy = (float(getattr(rod, n)[k]) for n in ("gamma", "moment", "energy"))
+    gamma = float(rod.gamma[k])
+    values = {name: float(getattr(rod, name)[k]) for name in scales}
 
     def apart(point: Point) -> float:
-        at = point.solution
-        return math.hypot((at.moment - moment) / scales[0], (at.energy - energy) / scales[1])
+        others = {name: getattr(point.solution, name) for name in scales}
+        return math.hypot(*((others[n] - values[n]) / scales[n] for n in scales))
 
     here = [point for point in points if abs(point.solution.gamma - gamma) < SAME]
     if not here:
         return None
-    point = min(here, key=apart)
-    at = point.solution
-    slopes = (at.slope, 4.0 * at.moment)
-    errors = _errors(rod, k)
-    own = (point.error.moment, point.error.energy)
-    distances: list[float] = []
-    bars: list[float | None] = []
-    for value, other, slope, scale, name, solved in zip(
-        (moment, energy),
-        (at.moment, at.energy),
-        slopes,
-        scales,
-        ("moment", "energy"),
-        own,
-        strict=True,
-    ):
-        steep = slope * math.pi / scale  # in the scaled plane
-        rise = other + slope * (gamma - at.gamma)
-        distances.append(abs(value - rise) / scale / math.hypot(1.0, steep))
-        if errors is None:
-            bars.append(None)
-            continue
-        vertical = (errors[name] + solved) / scale
-        horizontal = (errors["gamma"] + point.error.gamma) / math.pi
-        bars.append((vertical + abs(steep) * horizontal) / math.hypot(1.0, steep) + tolerance)
-    if max(distances) > FAR:
-        return None
-    return ComparedState(
-        gamma,
-        kind,
-        moment,
-        energy,
-        at.moment,
-        at.energy,
-        distances[0],
-        bars[0],
-        distances[1],
-        bars[1],
-    )
+    point, errors = min(here, key=apart), _errors(rod, k)
+    kinds = {special.position: special.kind for special in rod.points}
+    entries: dict[str, Any] = {"gamma": gamma, "kind": kinds.get(k, "")}
+    for name, scale in scales.items():
+        distance, bar = _distance(name, (gamma, values[name]), point, scale, errors)
+        entries |= {
+            f"rod_{name}": values[name],
+            f"bvp_{name}": getattr(point.solution, name),
+            f"{name}_distance": distance,
+            f"{name}_bar": None if bar is None else bar + tolerance,
+        }
+    far = max(entries[f"{name}_distance"] for name in scales) > FAR
+    return None if far else ComparedState(**entries)
+
+
+def _distance(
+    name: str,
+    place: tuple[float, float],
+    point: Point,
+    scale: float,
+    errors: Mapping[str, float] | None,
+) -> tuple[float, float | None]:
+    """Normal distance of a place from the tangent at a solution, in the scaled plane, and its bar.
+
+    Parameters
+    ----------
+    name : "moment" or "energy".
+    place : gamma and value of the rod.
+    """
+    at, (gamma, value) = point.solution, place
+    slope = at.slope if name == "moment" else 4.0 * at.moment
+    steep = slope * math.pi / scale
+    rise = getattr(at, name) + slope * (gamma - at.gamma)
+    distance = abs(value - rise) / scale / math.hypot(1.0, steep)
+    if errors is None:
+        return distance, None
+    vertical = (errors[name] + getattr(point.error, name)) / scale
+    horizontal = (errors["gamma"] + point.error.gamma) / math.pi
+    return distance, (vertical + abs(steep) * horizontal) / math.hypot(1.0, steep)
 
 
 def _errors(rod: Path, k: int) -> Mapping[str, float] | None:

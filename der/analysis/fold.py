@@ -19,8 +19,8 @@ from der.analysis.path_record import (
 )
 from der.analysis.request import LOOSE_TURN, Request, ring_of
 from der.errors import Interrupted, NotConverged, Reason
-from der.geometry.ring import circle
 from der.geometry.section import section
+from der.geometry.shapes import circle
 from der.kernels.quaternions import Array
 from der.kernels.strands import gap, nearest_strands
 from der.problem import Options, Point, Statistics

@@ -14,8 +14,8 @@ from der.bvp.record import Followed
 from der.bvp.sectors import sector
 from der.bvp.step import Statistics
 from der.errors import STOPPED, ContinuationFailed, Interrupted, NotConverged, Reason
-from der.geometry.ring import circle
 from der.geometry.section import section
+from der.geometry.shapes import circle
 from der.records.path import Path, Timing
 from der.scene import Scene
 from der.utils.checks import checked_number

@@ -111,24 +111,36 @@ def phase(wanted: PhaseOptions) -> int:
 
 
 def _diagram(wanted: PhaseOptions, name: str, folder: File) -> str:
-    """Make one diagram, and return its summary."""
+    """Make one diagram, say what its boundaries leave open, and return its summary."""
     from der.analysis.fold import fold
-    from der.diagram.diagram import run_phase
+    from der.diagram.diagram import doubts, phase_diagram, summary
 
-    return run_phase(
+    diagram = phase_diagram(
         name,
         folder,
         workers=wanted.workers,
         scheduler=wanted.scheduler,
         resume=wanted.resume,
         nu=wanted.nu,
-        ranges=tuple(wanted.span or ()),
+        ranges=dict(map(_range, wanted.span or ())),
         check=fold if wanted.check else None,
         sample=wanted.sample,
         finest=wanted.finest,
-        quiet=wanted.quiet,
-        warn=_warn,
+        progress=not wanted.quiet,
     )
+    for words in doubts(diagram):
+        say(f"der: {name}: {words}")
+    return summary(diagram)
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    """The name and the two numbers of "b_over_a=0.7:1"."""
+    name, _, values = text.partition("=")
+    try:
+        low, high = map(float, values.split(":"))
+    except ValueError:
+        raise ValueError(f"ranges must be like b_over_a=0.7:1, got {text!r}") from None
+    return name.strip().replace("-", "_"), (low, high)
 
 
 def _warn(words: str) -> None:

@@ -1,4 +1,4 @@
-"""How each kind of record is told on the terminal, and drawn: one table.
+"""How each kind of record is told on the terminal, and what is written of it: one table.
 
 What a kind needs is imported when a record of it is written.
 """
@@ -27,125 +27,95 @@ class Kind:
 
     Attributes
     ----------
-    text : what is printed
     empty : why there is nothing to draw; "" where there is
-    unfinished : what is said where it is not complete, and where it is
+    unfinished : what was found of a record that is not complete, and where it is
     moving : what shows it in motion, by option
+    repeats : whether the summary repeats why it is not complete
     """
 
-    text: Callable[[Any], str]
     empty: Callable[[Any], str]
     unfinished: Callable[[Any, Targets], str]
     moving: Mapping[str, Moving] = field(default_factory=dict)
+    repeats: bool = True
 
 
-def _lazy(place: str) -> Callable[..., Any]:
-    """The function at module:function of `der`, imported when it is called."""
-    module, name = place.split(":")
-
-    def call(*given: Any, **more: Any) -> Any:
-        return getattr(import_module(f"der.{module}"), name)(*given, **more)
-
-    return call
-
-
-# --- Paths -----------------------------------------------------------------------------------
-
-
-def _together(place: str) -> Moving:
+def _together(module: str, save: str) -> Moving:
     """The writer of a path, and of another where there is one."""
-    write = _lazy(place)
-    return lambda path, other, file: write(path if other is None else [path, other], file)
+
+    def write(path: Any, other: Any, file: File) -> None:
+        shown = path if other is None else [path, other]
+        getattr(import_module(f"der.viz.{module}"), save)(shown, file)
+
+    return write
 
 
-_PATH = Kind(
-    _lazy("records.text:summary"),
-    lambda path: "" if len(path) > 1 else "there is no path of two states",
-    lambda path, targets: f"{path.message}; {whereabouts(path, targets)}",
-    {
-        "rrd": _together("viz.rerun.recording:save_recording"),
-        "html": _together("viz.html:save_html"),
-        "movie": _together("viz.movie:save_movie"),
-    },
-)
-_COMPARISON = Kind(
-    _lazy("records.text:summary"),
-    lambda comparison: "",
-    lambda comparison, targets: "",
-)
-
-# --- Landscapes ------------------------------------------------------------------------------
-
-
-def _text_of_landscape(found: Any) -> str:
-    # what is not done says why on standard error
-    text: str = _lazy("records.text:summary")(found, why=found.status == "done")
-    return text
-
-
-def _unfinished_landscape(found: Any, targets: Targets) -> str:
-    return f"{_lazy('records.text:reason')(found)}; what was found is {places(targets)}"
-
-
-def _play_landscape(found: Any, along: Callable[[], Any] | None, file: File) -> None:
+def _play(found: Any, along: Callable[[], Any] | None, file: File) -> None:
     """Record a landscape; a surface with the landscape along its path, which is found now."""
-    save = _lazy("viz.rerun.recording:save_landscape")
+    from der.viz.rerun.recording import save_landscape
+
     if along is None:
-        save(found, file)
+        save_landscape(found, file)
         return
     landscape = along()
     if landscape.status == "interrupted":
         raise KeyboardInterrupt
-    save(landscape, file, surface=found)
+    save_landscape(landscape, file, surface=found)
+
+
+def _states_found(found: Any, targets: Targets) -> str:
+    where = places(targets, shapes=found.shapes is not None)
+    return f"states that were found: {len(found)}, {where}"
 
 
 def _landscape(empty: Callable[[Any], str]) -> Kind:
-    moving = {"rrd": _play_landscape}
-    return Kind(_text_of_landscape, empty, _unfinished_landscape, moving)
+    def found(_: Any, targets: Targets) -> str:
+        return f"what was found is {places(targets)}"
+
+    return Kind(empty, found, {"rrd": _play}, repeats=False)
 
 
-# --- States ----------------------------------------------------------------------------------
-
-
-def _unfinished_states(found: Any, targets: Targets) -> str:
-    where = places(targets, shapes=found.shapes is not None)
-    return f"{found.message}; states that were found: {len(found)}, {where}"
-
-
-def _states() -> Kind:
-    return Kind(
-        _lazy("records.text:summary"),
-        lambda found: "" if len(found) else "there is no state",
-        _unfinished_states,
-    )
-
-
-_PLANAR = _states()
+_STATES = Kind(lambda found: "" if len(found) else "there is no state", _states_found)
 
 KINDS = {  # by the name of the record's class
-    "Path": _PATH,
-    "Comparison": _COMPARISON,
-    "Landscape": _landscape(
-        lambda found: "" if len(found.path) else "there is no state",
+    "Path": Kind(
+        lambda path: "" if len(path) > 1 else "there is no path of two states",
+        whereabouts,
+        {
+            "rrd": _together("rerun.recording", "save_recording"),
+            "html": _together("html", "save_html"),
+            "movie": _together("movie", "save_movie"),
+        },
     ),
+    "Comparison": Kind(lambda found: "", lambda found, targets: ""),
+    "Landscape": _landscape(lambda found: "" if len(found.path) else "there is no state"),
     "Surface": _landscape(
-        lambda found: "" if found.count.any() else "there is no minimum in any cell",
+        lambda found: "" if found.count.any() else "there is no minimum in any cell"
     ),
     "Pass": _landscape(
-        lambda found: "" if found.saddle is not None else "there is no saddle to cross",
+        lambda found: "" if found.saddle is not None else "there is no saddle to cross"
     ),
     "LeastPush": _landscape(
-        lambda found: "" if found.best is not None else "there is no push that opens the ring",
+        lambda found: "" if found.best is not None else "there is no push that opens the ring"
     ),
-    "States": _states(),
-    "PlanarStates": _PLANAR,
-    "Squeeze": _PLANAR,
+    "States": _STATES,
+    "PlanarStates": _STATES,
+    "Squeeze": _STATES,
 }
 
 
-def kind(record: object) -> Kind:
-    """The kind of a record."""
-    return KINDS[type(record).__name__]
+def unfinished(record: Any, targets: Targets) -> str:
+    """Why a record is not complete, and where what was found of it is."""
+    from der.records.text import reason
+
+    return f"{reason(record)}; {KINDS[type(record).__name__].unfinished(record, targets)}"
+
+
+def text(record: Any) -> str:
+    """What is printed of a record."""
+    from der.records.text import summary
+
+    done = getattr(record, "status", "done") == "done"
+    return summary(record, why=done or KINDS[type(record).__name__].repeats)
 
 
 def writers(record: Any, beside: Any = None) -> Writers:
@@ -156,9 +126,9 @@ def writers(record: Any, beside: Any = None) -> Writers:
     record : of one of the KINDS.
     beside : what is shown with it: another path; of a surface, what makes the landscape along it.
     """
-    own = kind(record)
-    moving = {option: partial(write, record, beside) for option, write in own.moving.items()}
-    reason = own.empty(record)
+    kind = KINDS[type(record).__name__]
+    moving = {option: partial(write, record, beside) for option, write in kind.moving.items()}
+    reason = kind.empty(record)
     drawn: Writers = dict.fromkeys(DRAWN, reason) if reason else {"plot": record.plot, **moving}
     save_shapes = getattr(getattr(record, "shapes", None), "save", None)
     return drawn if save_shapes is None else {**drawn, "shapes": save_shapes}

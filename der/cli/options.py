@@ -63,7 +63,7 @@ class RingOptions:
 
     def ring(self) -> Ring:
         """The ring that the command line describes."""
-        from der.geometry import ring as rings
+        from der.geometry import shapes as rings
 
         if self.shape not in SHAPES:
             raise typer.TyperException(f"SHAPE must be {', '.join(SHAPES)}, got {self.shape!r}")

@@ -77,7 +77,7 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
         written = targets(files, "comparison")
 
     def solve(tick: Tick) -> der.Comparison:
-        return der.compare(scene, der.fold(scene, progress=tick), progress=tick)
+        return der.compare(scene, progress=tick)
 
     # the files named are a comparison's: a path that is left on the way goes elsewhere
     return run(solve, written, bar=over_gamma(scene), partial={}, quiet=files.quiet)[1]

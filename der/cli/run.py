@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from der.cli.kinds import kind, writers
+from der.cli.kinds import text, unfinished, writers
 from der.cli.output import OUTPUT, deliver, keep_somewhere, say, show
 
 if TYPE_CHECKING:
@@ -50,18 +50,18 @@ def run(
     try:
         with _progress(bar, quiet=quiet) as tick:
             found = solve(tick)
-    except (NotConverged, Interrupted) as unfinished:
-        found = unfinished.path
+    except (NotConverged, Interrupted) as stopped:
+        found = stopped.path
         targets = targets if partial is None else partial
     status = getattr(found, "status", "done")
     if status != "done":
         keep_somewhere(targets)
     code = max(CODES.get(status, 3), deliver(found, targets, writers(found, beside)))
     if status != "done":
-        say(f"der: {kind(found).unfinished(found, targets)}")
+        say(f"der: {unfinished(found, targets)}")
     if quiet or OUTPUT in targets.get("json", ()):
         return found, code
-    return found, code if show(kind(found).text(found)) else max(code, 3)
+    return found, code if show(text(found)) else max(code, 3)
 
 
 # --- Progress --------------------------------------------------------------------------------

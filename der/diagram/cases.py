@@ -7,15 +7,16 @@ import json
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cache
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from der.geometry.ring import Ring, ring_from_json
+from der.geometry.ring import Ring
 from der.geometry.section import rectangular_section
+from der.geometry.shapes import ring_from_json
 from der.records.path import Path
 from der.scene import Scene
 
@@ -186,7 +187,7 @@ def solve_case(case: Case) -> Row:
         row = row_of(case, path)
     except Exception as problem:  # whatever it is, it must not take the other cases along
         row = failed(case, f"{type(problem).__name__}: {problem}")
-    return _timed(row, time.perf_counter() - started)
+    return replace(row, seconds=round(time.perf_counter() - started, 6))
 
 
 def failed(case: Case, why: str) -> Row:
@@ -240,11 +241,6 @@ def _error(path: Path) -> float | None:
         if value is not None
     ]
     return float(max(parts, default=math.nan)) if len(parts) == 2 * len(path) else None
-
-
-def _timed(row: Row, seconds: float) -> Row:
-    entries = {entry.name: getattr(row, entry.name) for entry in fields(row)}
-    return Row(**entries | {"seconds": round(seconds, 6)})
 
 
 @cache

@@ -12,12 +12,13 @@ import io
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
+from typing import TYPE_CHECKING, ClassVar
 
-from der.diagram.boundaries import Boundaries
 from der.diagram.cases import LABELS, PARAMETERS, Case, Row, solve_case
+from der.diagram.curves.slices import Boundaries
 from der.diagram.distributed import follow, loose_ends, unexplained
 from der.diagram.families import FAMILIES, Family, family
 from der.diagram.rod_check import Compared, Fold, rod_check, table
@@ -25,16 +26,20 @@ from der.diagram.scan import Scan, Solve, scan
 from der.diagram.scanned_boundaries import Corner, Curve
 from der.diagram.store import Store
 from der.diagram.workers import workers as started
+from der.records.record import Shown
 from der.utils.files import FilePath, write_whole
 
-__all__ = ["FAMILIES", "Diagram", "phase_diagram", "run_phase"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["FAMILIES", "PhaseDiagram", "phase_diagram"]
 
 STORE = "cases.jsonl"
 SAMPLE = 40
 
 
-@dataclass(frozen=True)
-class Diagram:
+@dataclass(frozen=True, repr=False)
+class PhaseDiagram(Shown):
     """A phase diagram.
 
     Attributes
@@ -47,6 +52,8 @@ class Diagram:
     seconds : what it took: the scan, the boundaries, the check
     """
 
+    NAME: ClassVar[str] = "phase diagram"
+
     scan: Scan
     curves: tuple[Curve, ...]
     corners: tuple[Corner, ...]
@@ -58,6 +65,18 @@ class Diagram:
     def family(self) -> Family:
         """What was scanned."""
         return self.scan.family
+
+    def facts(self) -> list[str]:
+        """Which family, and how much is known of it."""
+        sizes = (f"{len(self.rows)} cases", f"{len(self.curves)} boundaries")
+        return [self.family.name, *sizes, f"{len(self.corners)} corners"]
+
+    def figure(self) -> Figure:
+        """The regions of folding modes and their boundaries."""
+        from der.diagram.picture import picture
+        from der.viz.plots.phase_diagram import draw
+
+        return draw(picture(self.scan, self.curves))
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -79,7 +98,7 @@ def phase_diagram(
     finest: int | None = None,
     progress: bool = True,
     solve: Solve = solve_case,
-) -> Diagram:
+) -> PhaseDiagram:
     """The phase diagram of a family of rings, written to a folder.
 
     Every finished case is in `cases.jsonl` at once, so that a run that ends in whatever way, and is
@@ -132,49 +151,12 @@ def phase_diagram(
     clock.append(time.perf_counter())
     files = (cases, *_written(folder, found, bounds, compared, beside))
     seconds = (clock[1] - clock[0], clock[2] - clock[1], clock[3] - clock[2])
-    return Diagram(found, tuple(bounds.curves), tuple(bounds.corners), compared, files, seconds)
-
-
-def run_phase(
-    name: str,
-    folder: FilePath,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    resume: bool = False,
-    nu: float = 0.3,
-    ranges: Sequence[str] = (),
-    check: Fold | None = None,
-    sample: int = SAMPLE,
-    finest: int | None = None,
-    quiet: bool = False,
-    warn: Callable[[str], object] = lambda words: None,
-    solve: Solve = solve_case,
-) -> str:
-    """`phase` for the command line: ranges as "b_over_a=0.7:1"; returns what there is to say.
-
-    What the boundaries leave open is told to ``warn``, quiet or not.
-    """
-    diagram = phase_diagram(
-        name,
-        folder,
-        workers=workers,
-        scheduler=scheduler,
-        resume=resume,
-        nu=nu,
-        ranges=dict(map(_range, ranges)),
-        check=check,
-        sample=sample,
-        finest=finest,
-        progress=not quiet,
-        solve=solve,
+    return PhaseDiagram(
+        found, tuple(bounds.curves), tuple(bounds.corners), compared, files, seconds
     )
-    for words in doubts(diagram):
-        warn(f"{name}: {words}")
-    return summary(diagram)
 
 
-def doubts(diagram: Diagram) -> list[str]:
+def doubts(diagram: PhaseDiagram) -> list[str]:
     """In what the boundaries of a diagram are not complete, a line each; none if they are."""
     family, curves = diagram.family, diagram.curves
     lines = []
@@ -190,7 +172,7 @@ def doubts(diagram: Diagram) -> list[str]:
     return lines
 
 
-def summary(diagram: Diagram) -> str:
+def summary(diagram: PhaseDiagram) -> str:
     """Cases by label, what it took, and what was written, in a few lines."""
     rows = diagram.rows
     count = Counter(row.label for row in rows)
@@ -210,16 +192,6 @@ def summary(diagram: Diagram) -> str:
     if diagram.compared:
         lines.append(table(diagram.compared))
     return "\n".join([*lines, *map(str, diagram.files)])
-
-
-def _range(text: str) -> tuple[str, tuple[float, float]]:
-    """The name and the two numbers of "b_over_a=0.7:1"."""
-    name, _, values = text.partition("=")
-    try:
-        low, high = map(float, values.split(":"))
-    except ValueError:
-        raise ValueError(f"ranges must be like b_over_a=0.7:1, got {text!r}") from None
-    return name.strip().replace("-", "_"), (low, high)
 
 
 def _made(folder: FilePath) -> File:
@@ -246,7 +218,9 @@ def _written(
     beside: Sequence[Row],
 ) -> tuple[File, ...]:
     """Write boundaries, check and picture; the table of cases has long been written."""
-    from der.viz.plots.phase_diagram import save_diagram
+    from der.diagram.picture import picture
+    from der.viz.plots.phase_diagram import draw
+    from der.viz.plots.style import save
 
     curves, corners = bounds
     files = [
@@ -255,8 +229,9 @@ def _written(
     ]
     if compared:
         files.append(_write(folder / "check.csv", CHECK_COLUMNS, map(_check_cells, compared)))
-    files.append(save_diagram(found, curves, folder / f"{found.family.name}.png", beside))
-    return tuple(files)
+    file = folder / f"{found.family.name}.png"
+    save(draw(picture(found, curves, beside)), file)
+    return (*files, file)
 
 
 MODE_COLUMNS = ("label", "foldable", "stable", "snapping", "moment", "slope", "folds", "error")

@@ -14,19 +14,13 @@ from functools import partial
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram import polylines as polygons
-from der.diagram.boundaries import (
-    Boundaries,
-    Slice,
-    boundaries,
-    joined,
-    slice_boundaries,
-    slices,
-)
 from der.diagram.cases import Case, Row
+from der.diagram.curves import polylines as polygons
+from der.diagram.curves.boundaries import boundaries, slice_boundaries
+from der.diagram.curves.polylines import distance
+from der.diagram.curves.slices import Boundaries, Slice, joined, slices
 from der.diagram.families import Family
 from der.diagram.jobs import Jobs
-from der.diagram.polylines import distance
 from der.diagram.scan import Scan, Solve, solve_all
 from der.diagram.scanned_boundaries import BoundaryPoint, Corner, Curve, scanned_boundaries
 from der.diagram.store import Store

@@ -6,7 +6,8 @@ import csv
 import json
 from pathlib import Path
 
-from der.geometry.ring import Ring, profile
+from der.geometry.ring import Ring
+from der.geometry.shapes import profile
 
 COLUMNS = {
     ("arc_length", "curvature"): "knots of the natural curvature",
@@ -21,7 +22,7 @@ def read_profile(file: str) -> Ring:
     ----------
     file : a CSV file whose first line names its two columns, arc_length,curvature or x,y; or JSON,
         an object with "arc_length" and "curvature", or with "points", a list of pairs. Lines of a
-        CSV file that start with # are not read. What they mean, `ring.profile` says.
+        CSV file that start with # are not read. What they mean, `shapes.profile` says.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from pathlib import Path as File
 
 import numpy as np
 
-from der.geometry.ring import circle
+from der.geometry.shapes import circle
 from der.paper import canvas
 from der.paper.bars import bar
 from der.paper.cases import (
@@ -16,9 +16,9 @@ from der.paper.cases import (
     at_vertices,
     smooth,
     solved,
-    write_shapes,
 )
 from der.paper.snapshots import LEVEL
+from der.paper.tables import write_shapes
 from der.utils.files import FilePath
 from der.viz.plots import style
 

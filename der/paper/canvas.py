@@ -14,7 +14,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure as Figure
 
 from der.paper.bars import Picture
-from der.paper.cases import Array, Curve, in_words, smooth, write_curves
+from der.paper.cases import Array, Curve, in_words, smooth
+from der.paper.tables import write_curves
 from der.utils.files import FilePath
 from der.viz.palette import INK as INK
 from der.viz.palette import QUIET as QUIET

@@ -1,13 +1,10 @@
-"""What the figures show: rings with their sections, their paths, and tables of the states."""
+"""What the figures show: rings with their sections, and the states of their paths."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path as File
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,13 +12,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from der.bvp.solve import solve_bvp
-from der.geometry.mesh import sites
 from der.geometry.ring import Ring
 from der.geometry.section import rectangular_section
 from der.records.configurations import Shapes
 from der.records.path import Mode, Path, Point
 from der.scene import Scene
-from der.utils.files import FilePath, write_whole
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -30,24 +25,6 @@ PER = 8  # the panel of one through 1024, measured on every curve of the figures
 N_EDGES = 256  # of a drawn ring: 10 in the sharpest fillet
 SAME = 1e-6  # of the curve; states that are closer (a fold next to a saved state) make no slope
 ARRIVED = 1e-9  # rad
-
-RING_COLUMNS = {
-    "ring": "circle or ellipse or rectangle or triangle",
-    "twist_axis": "x: grips at the ends of the short semi-axis; y: of the long one",
-    "b_over_a": "short semi-axis over the long one",
-    "r_over_a": "radius of the fillets",
-    "vertex_angle": "of the triangle at the apex [degrees]",
-    "h_over_t": "height over thickness of the section; Poisson's ratio is 0.3",
-}
-STATE_COLUMNS = {
-    "gamma": "rotation of one grip [rad]",
-    "moment": "of one arm [GJ/a]",
-    "energy": "of the full ring [GJ/a]",
-    "error_gamma": "estimated error of gamma [rad]",
-    "error_moment": "of the moment [GJ/a]",
-    "error_energy": "of the energy [GJ/a]",
-}
-POINT_COLUMN = {"point": "fold: gamma turns back; limit: the moment turns back; else empty"}
 
 
 @dataclass(frozen=True)
@@ -73,7 +50,7 @@ class Case:
         return plain(f"{self.panel} {self.label}")
 
     def entries(self) -> list[str]:
-        """Its cells in a table: `case` and RING_COLUMNS."""
+        """Its cells in a table: `case`, then RING_COLUMNS of tables.py."""
         ring = self.ring.to_json()
         shape = ring["shape"]
         cells = [ring.get(name, "") for name in ("b_over_a", "r_over_a", "vertex_angle")]
@@ -108,7 +85,7 @@ class Curve:
 
     Attributes
     ----------
-    states : (n, 6) array, STATE_COLUMNS in path order
+    states : (n, 6) array in path order, STATE_COLUMNS of tables.py
     points : folds and limits among them
     mode : of the whole path, None where it ends before pi
     shapes : of the states, None where they were not asked for
@@ -197,44 +174,6 @@ def in_words(mode: Mode | None) -> str:
     return f"{'stable' if mode.stable else 'unstable'}, {snapping}"
 
 
-# --- Tables ----------------------------------------------------------------------------------
-
-
-def write_curves(file: FilePath, about: str, curves: Iterable[Curve]) -> File:
-    """Write the table of all states of the curves; return the file."""
-    rows = []
-    curves = list(curves)
-    for curve in curves:
-        kinds = {point.position: point.kind for point in curve.points}
-        for k, state in enumerate(curve.states.tolist()):
-            rows.append([*curve.case.entries(), *map(repr, state), kinds.get(k, "")])
-    return _write(file, about, curves, STATE_COLUMNS | POINT_COLUMN, rows)
-
-
-def write_shapes(file: FilePath, about: str, shots: Iterable[tuple[Curve, int]]) -> File:
-    """Write the table of the ring in some states (curve, position); return the file."""
-    shots = list(shots)
-    place = ("r1", "r2", "r3", "d11", "d12", "d13")
-    columns = STATE_COLUMNS | {
-        "arc_length": "of the vertex from the first grip [a]",
-        **dict.fromkeys(
-            place[:3], "position of the vertex along E1 or E2 or E3 (twisting axis) [a]"
-        ),
-        **dict.fromkeys(place[3:], "component of the director d1, along the section's height"),
-    }
-    rows = []
-    for curve, k in shots:
-        x, d1 = at_vertices(curve, k)
-        frames = sites(curve.case.ring, len(x), "full")
-        s = 0.5 * (frames[:-1] + frames[1:])
-        state = list(map(repr, curve.states[k].tolist()))
-        rows += [
-            [*curve.case.entries(), *state, *map("{:.10g}".format, row)]
-            for row in np.column_stack([s, x, d1]).tolist()
-        ]
-    return _write(file, about, [curve for curve, _ in shots], columns, rows)
-
-
 def at_vertices(curve: Curve, k: int) -> tuple[Array, Array]:
     """Vertices and the directors d1 there, (N, 3) each, of a state with shapes."""
     if curve.shapes is None:
@@ -242,25 +181,3 @@ def at_vertices(curve: Curve, k: int) -> tuple[Array, Array]:
     d1 = curve.shapes.frames[k, :, 0]
     d1 = d1 + np.roll(d1, -1, axis=0)  # vertex j joins edges j and j + 1
     return curve.shapes.x[k], d1 / np.linalg.norm(d1, axis=1, keepdims=True)
-
-
-def _write(
-    file: FilePath,
-    about: str,
-    curves: Sequence[Curve],
-    columns: Mapping[str, str],
-    rows: Iterable[Sequence[str]],
-) -> File:
-    """Write a table: lines of words that begin with #, the columns' names, and the rows."""
-    columns = {"case": "which curve", **RING_COLUMNS, **columns}
-    modes = {curve.case.name: plain(in_words(curve.mode)) for curve in curves}
-    text = io.StringIO(newline="")
-    text.write(f"# {about}\n")
-    text.write("# " + "; ".join(f"{name}: {words}" for name, words in columns.items()) + "\n")
-    text.write("# modes: " + "; ".join(f"{name}: {mode}" for name, mode in modes.items()) + "\n")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(columns)
-    table.writerows(rows)
-    content = text.getvalue().encode()
-    write_whole(file, lambda opened: opened.write(content))
-    return File(file)

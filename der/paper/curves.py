@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from pathlib import Path as File
 
-from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
+from der.geometry.ring import Ring
+from der.geometry.shapes import circle, ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.cases import Case, Curve, in_words, plain, solved
 from der.utils.files import FilePath

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LightSource
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
-from der.geometry.ring import circle
+from der.geometry.shapes import circle
 from der.paper import canvas
 from der.paper.cases import Array, Case, Curve, smooth, solved
 from der.utils.files import FilePath

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from der.bvp.folded_shape import folded
 from der.bvp.packing import packing_ratio
-from der.geometry.ring import Ring, ellipse, rectangle, triangle
+from der.geometry.ring import Ring
+from der.geometry.shapes import ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.canvas import INK, QUIET
 from der.paper.cases import Array
@@ -60,26 +61,12 @@ TRIANGLES = (  # (vertex angle in degrees, r/a)
 
 
 def fig3b(folder: FilePath, columns: int = 51) -> list[Path]:
-    """Write the packing ratio of ellipses against b/a in [0.5, 1], fig3b.png and fig3b.csv.
-
-    Parameters
-    ----------
-    folder : path
-        An existing folder.
-    columns : int
-        Number of ellipses, at least 2.
-
-    Returns
-    -------
-    list of Path
-        The files written.
+    """Draw the packing ratio of ellipses against b/a in [0.5, 1]; return the files.
 
     Raises
     ------
     ValueError
-        If `columns` is less than 2.
-    OSError
-        If a file cannot be written; none is left half written.
+        If `columns`, the number of ellipses, is less than 2.
     """
     b = np.linspace(0.5, 1.0, _checked(columns))
     ratio = np.array([packing_ratio(ellipse(c), MAP_POINTS) for c in b])
@@ -88,7 +75,7 @@ def fig3b(folder: FilePath, columns: int = 51) -> list[Path]:
 
 
 def fig6(folder: FilePath, columns: int = 49) -> list[Path]:
-    """Write the packing ratio of rectangles over (b/a, r/a), fig6.png and fig6.csv.
+    """Draw the packing ratio of rectangles over (b/a, r/a); return the files.
 
     Parameters and errors are those of `fig3b`; the map has two rows for five columns.
     """
@@ -105,7 +92,7 @@ def fig6(folder: FilePath, columns: int = 49) -> list[Path]:
 
 
 def fig9(folder: FilePath, columns: int = 22) -> list[Path]:
-    """Write the packing ratio of triangles over (vertex angle, r/a), fig9.png and fig9.csv.
+    """Draw the packing ratio of triangles over (vertex angle, r/a); return the files.
 
     Parameters and errors are those of `fig3b`; the map has two rows for five columns. With
     small fillets the folded shape of least energy, and so the ratio, jumps between 50 and 60

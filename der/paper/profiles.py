@@ -10,7 +10,7 @@ from pathlib import Path as File
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from der.geometry.ring import ellipse, rectangle, triangle
+from der.geometry.shapes import ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.bars import Camera, bar, camera
 from der.paper.cases import Case, Curve, at_vertices, in_words, solved

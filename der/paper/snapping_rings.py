@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from der.geometry.ring import ellipse, rectangle, triangle
+from der.geometry.shapes import ellipse, rectangle, triangle
 
 SNAPPING = {
     "triangle_120": (triangle(2 * math.pi / 3, 1 / 15), 1.0),

@@ -7,7 +7,8 @@ from pathlib import Path as File
 
 import numpy as np
 
-from der.geometry.ring import Ring, circle, ellipse, rectangle, triangle
+from der.geometry.ring import Ring
+from der.geometry.shapes import circle, ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.bars import Camera, Picture, bar, camera
 from der.paper.cases import (
@@ -17,8 +18,8 @@ from der.paper.cases import (
     in_words,
     plain,
     solved,
-    write_shapes,
 )
+from der.paper.tables import write_shapes
 from der.utils.files import FilePath
 
 EIGHTHS = (0, 2, 4, 5, 6, 7, 8)  # of pi: the snapshots; the ring moves most near the end

@@ -60,7 +60,15 @@ def _converter() -> Any:
         left_out = {one.name for one in fields(kind)} - set(written(kind))
         omitted: dict[str, Any] = {name: override(omit=True) for name in left_out}
         build = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True, **omitted)
-        return lambda value, _: build(kind.from_disk(dict(_a(dict, value))), kind)
+        needed = [name for name in written(kind) if name not in kind.OPTIONAL]
+
+        def read(value: Any, _: Any) -> Any:
+            entries = kind.from_disk(dict(_a(dict, value)))
+            if missing := [name for name in needed if name not in entries]:
+                raise ValueError(f"{missing[0]} is missing")
+            return build(entries, kind)
+
+        return read
 
     # the last one that fits is taken
     converter.register_structure_hook_factory(_is_tuple, of_tuple)
@@ -100,8 +108,6 @@ def _fault(problem: BaseException) -> str:
             place += f"[{note.index}]"
         elif isinstance(note, AttributeValidationNote) and note.name != kind.JOINED:
             place += f".{note.name}" if place else note.name
-    if isinstance(problem, KeyError):
-        return f"{place} is missing"
     if isinstance(problem, _Misplaced):
         return f"{place} {problem}"
     before = f"{place}." if place else ""

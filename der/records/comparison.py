@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -94,17 +95,17 @@ class Comparison(Record):
         entries.pop("within", None)
         return super().from_disk(entries)
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, and how well both agree."""
+    def facts(self) -> list[str]:
+        """How well both agree."""
         share = "no error bars" if math.isnan(self.within) else f"{100 * self.within:.1f} % agree"
         moment, energy = self.largest
-        return {
-            "ring": str(self.rod.ring.get("shape")),
-            "states": f"{len(self.states)} states",
-            "agreement": share,
-            "moments": f"M within {moment:.1e}",
-            "energies": f"U within {energy:.1e}",
-        }
+        within = f"within {moment:.1e} in M, {energy:.1e} in U"
+        return [f"{len(self.states)} states", share, within]
+
+    @property
+    def ring(self) -> Mapping[str, object]:  # type: ignore[override]
+        """The rod's."""
+        return self.rod.ring
 
     @property
     def solve_s(self) -> float:

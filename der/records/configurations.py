@@ -6,8 +6,10 @@ Free of kernels, like the record that they belong to; they are saved by themselv
 from __future__ import annotations
 
 import os
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import BinaryIO
 
 import numpy as np
 
@@ -15,10 +17,12 @@ from der.utils import checks
 from der.utils.checks import Array
 from der.utils.files import FilePath, write_whole
 
+LARGEST = 2**33  # bytes of arrays that are read
+
 
 @dataclass(frozen=True, eq=False)
 class Fall:
-    """How the ring falls in a snap: configurations in their order, none of them an equilibrium.
+    """How the ring moves in a snap: configurations in their order, none of them an equilibrium.
 
     Raises
     ------
@@ -61,7 +65,7 @@ class Softest:
         _keep(self, "eigenvalues of the modes", "eigenvalues", (n, len(classes)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shapes:
     """The full ring at every state of a path.
 
@@ -71,7 +75,7 @@ class Shapes:
         Vertex positions, a.
     frames : (n, N, 3, 3) array
         Material frames, per edge; rows d1, d2, d3.
-    falls : how the ring falls in its snaps, where that was kept.
+    falls : how the ring moves in its snaps, where that was kept.
     softest : its softest modes, where they were asked for.
     arc_length : (N,) array
         Arc lengths of the frames from the first grip, a; None where they are evenly spaced.
@@ -104,8 +108,12 @@ class Shapes:
                 f"u of the modes must have shape {self.x.shape}, got {self.softest.u.shape}"
             )
 
+    def __repr__(self) -> str:
+        states, vertices, _ = self.x.shape
+        return f"Shapes({states} states, {vertices} vertices, {len(self.falls)} snaps)"
+
     def save(self, path: FilePath) -> None:
-        """Write npz, whole or not at all.
+        """Write npz, atomically.
 
         Raises
         ------
@@ -130,16 +138,20 @@ class Shapes:
         OSError
             If the file cannot be read.
         ValueError
-            If it is broken or not such a file.
+            If it is broken, too large, or not such a file.
         """
         with open(path, "rb") as file:
             try:
+                _check_size(file)
                 with np.load(file, allow_pickle=False) as npz:
                     arrays = {name: npz[name] for name in npz.files}
                 x, frames, places = arrays["x"], arrays["frames"], arrays.get("arc_length")
                 falls, modes = _falls(arrays), _softest(arrays)
             except Exception as problem:  # zipfile and numpy raise some ten classes on broken files
-                raise ValueError(f"{os.fspath(path)}: no shapes.npz as --out writes") from problem
+                why = " ".join(str(problem).split())
+                raise ValueError(
+                    f"{os.fspath(path)}: no shapes.npz as --out writes ({why})"
+                ) from problem
         try:
             return cls(x, frames, falls, modes, places)
         except ValueError as problem:
@@ -152,6 +164,14 @@ def _keep(record: object, called: str, name: str, shape: tuple[int | str, ...]) 
     array.setflags(write=False)
     object.__setattr__(record, name, array)
     return array
+
+
+def _check_size(file: BinaryIO) -> None:
+    """Refuse what would not fit the memory, before it is unpacked."""
+    size = sum(part.file_size for part in zipfile.ZipFile(file).infolist())
+    if size > LARGEST:
+        raise ValueError(f"arrays of {size} bytes, and {LARGEST} are allowed")
+    file.seek(0)
 
 
 def _named(prefix: str, record: Fall | Softest) -> dict[str, Array]:

@@ -103,15 +103,10 @@ class Surface(Record):
                 if (value := getattr(cell, name)) not in axis:
                     raise ValueError(f"reasons[{i}].{name} must be on the grid, got {value!r}")
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, how fine the grid is, and how many cells have no minimum."""
+    def facts(self) -> list[str]:
+        """How fine the grid is, and how many cells have no minimum."""
         n, m = self.energy.shape
-        return {
-            "ring": str(self.ring.get("shape")),
-            "grid": f"{n} x {m} cells",
-            "empty": f"{int((self.count == 0).sum())} without a minimum",
-            "status": self.status,
-        }
+        return [f"{n} x {m} cells", f"{int((self.count == 0).sum())} without a minimum"]
 
     @property
     def count(self) -> Counts:

@@ -52,6 +52,7 @@ class Checked:
         Where an entry is not what its type says; the message begins with the name of the entry.
     """
 
+    OPTIONAL: ClassVar[tuple[str, ...]] = ()  # entries that a file may lack
     JOINED: ClassVar[str] = ""  # name of the entry whose own entries stand among these in a file
 
     def __post_init__(self) -> None:

@@ -106,13 +106,10 @@ class Landscape(Record):
 
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
         """The entries of the path, but for those that are always the same, and the others."""
-        of_path = entries.pop("path")
-        for name in ("schema", *self._KNOWN):
-            del of_path[name]
-        timing = of_path.pop("timing")
-        entries["why"] = entries["barriers"].pop("why")
-        last = {name: entries.pop(name) for name in ("why", "extrapolated")}
-        return super().on_disk(of_path | entries | last | {"timing": timing})
+        path = entries.pop("path")
+        first = {name: path[name] for name in _OF_PATH}
+        last = {"why": entries["barriers"].pop("why"), "extrapolated": entries.pop("extrapolated")}
+        return super().on_disk(first | entries | last | {"timing": path["timing"]})
 
     @classmethod
     def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
@@ -123,15 +120,16 @@ class Landscape(Record):
             own["barriers"] = own["barriers"] | {"why": own.pop("why")}
         return own | {"path": {"schema": 1} | cls._KNOWN | entries}
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, how many rests, and the barrier to open."""
+    def facts(self) -> list[str]:
+        """How many rests, and the barrier to open."""
         known = self.barriers.open
-        return {
-            "ring": str(self.path.ring.get("shape")),
-            "rests": f"{len(self.rests)} rests",
-            "open": "no barrier to open" if known is None else f"barrier to open {known:.6g}",
-            "status": self.status,
-        }
+        barrier = "no barrier to open" if known is None else f"barrier to open {known:.6g}"
+        return [f"{len(self.rests)} states with M = 0", barrier]
+
+    @property
+    def ring(self) -> Mapping[str, object]:  # type: ignore[override]
+        """The path's."""
+        return self.path.ring
 
     @property
     def status(self) -> str:
@@ -159,6 +157,8 @@ class Landscape(Record):
         return tuple(rest for rest in self.rests if rest.kind == "saddle")
 
 
+_ABOUT = ("status", "message", "reason", "ring", "section", "numerics")
+_OF_PATH = (*_ABOUT, "gamma", "energy", "moment", "index", "index_moment", "points")
 _OWN = ("rests", "folded", "barriers", "why", "extrapolated")
 _ALONG = gaps("h_over_t")
 
@@ -191,10 +191,10 @@ class BarrierCurves(Record):
         for name, values in {"index_free": self.index_free, "why": self.why, **self.error}.items():
             self._check_lengths(name, values, ("h_over_t",))
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, and over which h/t."""
+    def facts(self) -> list[str]:
+        """Over which h/t."""
         ends = f"{self.h_over_t[0]:g} to {self.h_over_t[-1]:g}" if len(self.h_over_t) else "-"
-        return {"ring": str(self.ring.get("shape")), "h/t": f"h/t {ends}"}
+        return [f"h/t {ends}"]
 
 
 # --- Without grips ---------------------------------------------------------------------------
@@ -244,11 +244,10 @@ class Pass(Record):
     timing: SolveTime
     shapes: Array = in_memory(lambda: np.zeros((0, 0, 3)))  # (k, N, 3) vertices on the path
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, and its barriers."""
+    def facts(self) -> list[str]:
+        """Its barriers."""
         known = {"fold": self.fold, "open": self.open}
-        heights = {n: f"{n} none" if v is None else f"{n} {v:.6g}" for n, v in known.items()}
-        return {"ring": str(self.ring.get("shape")), **heights, "status": self.status}
+        return [f"{n} none" if v is None else f"{n} {v:.6g}" for n, v in known.items()]
 
     @property
     def fold(self) -> float | None:

@@ -116,16 +116,11 @@ class LeastPush(Record):
                 if k >= len(self.pushes):
                     raise ValueError(f"{name}.{kind} is {k} of {len(self.pushes)} pushes")
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, and the least work of any slow push."""
+    def facts(self) -> list[str]:
+        """The least work of any slow push."""
         best = self.best
         work = "no push opens it" if best is None else f"work {best.held.work:.6g} by {best.kind}"
-        return {
-            "ring": str(self.ring.get("shape")),
-            "pushes": f"{len(self.pushes)} pushes",
-            "least": work,
-            "status": self.status,
-        }
+        return [f"{len(self.pushes)} pushes", work]
 
     @property
     def best(self) -> Push | None:

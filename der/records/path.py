@@ -125,6 +125,7 @@ class Path(Record):
 
     NAME: ClassVar[str] = "path"
     PLOT: ClassVar[str] = "der.viz.plots.path"
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("status", "message", "reason", "raw")
 
     solver: Annotated[str, one_of(SOLVERS)]
     status: Status = "done"  # what there is of an incomplete path is good
@@ -172,18 +173,19 @@ class Path(Record):
     def __len__(self) -> int:
         return len(self.gamma)
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, how it folds, and how far the path goes."""
+    def facts(self) -> list[str]:
+        """How the ring folds, and how far the path goes."""
         top = f"gamma to {self.gamma.max():.6g}" if len(self) else "no gamma"
-        found = {"solver": self.solver, "ring": str(self.ring.get("shape")), "reach": top}
+        mode = []
         if self.mode is not None:
-            foldable = "foldable" if self.mode.foldable else "not foldable"
-            found["mode"] = f"{foldable}, snapping {self.mode.snapping}"
-        return found | {
-            "states": f"{len(self)} states",
-            "points": f"{len(self.points)} special points",
-            "status": self.status,
-        }
+            mode = ["foldable" if self.mode.foldable else "not foldable", self.mode.snapping]
+        return [
+            self.solver,
+            top,
+            *mode,
+            f"{len(self)} states",
+            f"{len(self.points)} special points",
+        ]
 
     @property
     def folds(self) -> tuple[Point, ...]:

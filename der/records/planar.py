@@ -71,13 +71,9 @@ class PlanarStates(Record):
     timing: SolveTime = SolveTime(0.0)
     shapes: Shapes | None = in_memory()  # of the states
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, how many states, and how the search ended."""
-        return {
-            "ring": str(self.ring.get("shape")),
-            "states": f"{len(self)} states",
-            "status": self.status,
-        }
+    def facts(self) -> list[str]:
+        """How many states."""
+        return [f"{len(self)} states"]
 
     def __len__(self) -> int:
         return len(self.states)
@@ -140,15 +136,10 @@ class Squeeze(Record):
         super().__post_init__()
         self._check_lengths("index", self.index, ("distance",))
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, between which distances, and how the path ended."""
+    def facts(self) -> list[str]:
+        """Between which distances."""
         ends = f"{self.distance[0]:.6g} to {self.distance[-1]:.6g}" if len(self) else "-"
-        return {
-            "ring": str(self.ring.get("shape")),
-            "distance": f"distance {ends}",
-            "states": f"{len(self)} states",
-            "status": self.status,
-        }
+        return [f"distance {ends}", f"{len(self)} states"]
 
     def __len__(self) -> int:
         return len(self.index)

@@ -10,6 +10,7 @@ import base64
 import io
 import os
 import pathlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
@@ -36,13 +37,72 @@ class SolveTime(Checked):
     solve_s: Number
 
 
-class Record(Checked, Saved):
-    """An answer: written as JSON with one entry a line, and read again."""
+class Shown:
+    """An answer that can be drawn, and shown in a line or in a notebook."""
 
     NAME: ClassVar[str]  # what it is, in a word
+
+    def facts(self) -> list[str]:
+        """The main facts of this kind, each in a few words."""
+        raise NotImplementedError
+
+    def figure(self) -> Figure:
+        """The matplotlib figure of it."""
+        raise NotImplementedError
+
+    def plot(self, file: FilePath | None = None) -> Figure:
+        """Draw the record.
+
+        Parameters
+        ----------
+        file : where to write the picture, by its suffix .png, .pdf or .svg; None: nowhere.
+
+        Returns
+        -------
+        matplotlib Figure
+            To be shown or changed further.
+
+        Raises
+        ------
+        ValueError
+            If there is nothing to draw, or the file cannot be written.
+        """
+        figure = self.figure()
+        if file is not None:
+            import_module("der.viz.plots.style").save(figure, file)
+        return figure
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self._all_facts())})"
+
+    def _repr_html_(self) -> str:
+        """A table of the main facts, and the picture, for notebooks."""
+        cells = "".join(f"<td>{escape(text)}</td>" for text in self._all_facts())
+        table = f"<table><tr><th>{escape(self.NAME)}</th>{cells}</tr></table>"
+        return table + self._picture()
+
+    def _all_facts(self) -> list[str]:
+        return self.facts()
+
+    def _picture(self) -> str:
+        """The picture as an element of HTML; "" where there is nothing to draw."""
+        try:
+            figure = self.figure()
+        except ValueError:
+            return ""
+        png = io.BytesIO()
+        figure.savefig(png, format="png", dpi=90)
+        data = base64.b64encode(png.getvalue()).decode()
+        return f'<img alt="{escape(self.NAME)}" src="data:image/png;base64,{data}">'
+
+
+class Record(Checked, Shown, Saved):
+    """An answer: written as JSON with one entry a line, and read again."""
+
     KIND: ClassVar[str] = ""  # the first entry; "": the file has none
     PLOT: ClassVar[str]  # the module whose function `draw` makes the figure
 
+    ring: Mapping[str, object]
     timing: SolveTime
 
     def to_json(self) -> str:
@@ -104,55 +164,14 @@ class Record(Checked, Saved):
         """Seconds that the solver took."""
         return self.timing.solve_s
 
-    # --- Shown ---------------------------------------------------------------------------------
-
-    def facts(self) -> dict[str, str]:
-        """The main facts, each in a few words, by what it is a fact of."""
-        raise NotImplementedError
-
-    def plot(self, file: FilePath | None = None) -> Figure:
-        """Draw the record.
-
-        Parameters
-        ----------
-        file : where to write the picture, by its suffix .png, .pdf or .svg; None: nowhere.
-
-        Returns
-        -------
-        matplotlib Figure
-            To be shown or changed further.
-
-        Raises
-        ------
-        ValueError
-            If there is nothing to draw, or the file cannot be written.
-        """
+    def figure(self) -> Figure:
+        """The matplotlib figure of the record."""
         figure: Figure = import_module(self.PLOT).draw(self)
-        if file is not None:
-            import_module("der.viz.plots.style").save(figure, file)
         return figure
 
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(self.facts().values())})"
-
-    def _repr_html_(self) -> str:
-        """A table of the main facts, and the picture, for notebooks."""
-        rows = "".join(
-            f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>"
-            for name, text in self.facts().items()
-        )
-        return f"<table><caption>{escape(self.NAME)}</caption>{rows}</table>{self._picture()}"
-
-    def _picture(self) -> str:
-        """The picture as an element of HTML; "" where there is nothing to draw."""
-        try:
-            figure = self.plot()
-        except ValueError:
-            return ""
-        png = io.BytesIO()
-        figure.savefig(png, format="png", dpi=90)
-        data = base64.b64encode(png.getvalue()).decode()
-        return f'<img alt="{escape(self.NAME)}" src="data:image/png;base64,{data}">'
+    def _all_facts(self) -> list[str]:
+        """The ring, what is special, and the status."""
+        return [str(self.ring.get("shape")), *self.facts(), getattr(self, "status", "done")]
 
 
 def _decoded(content: bytes) -> str:

@@ -1,4 +1,4 @@
-"""The states of a ring, how stable they are and which of them falls to which; free of kernels."""
+"""The states of a ring, how stable they are and which of them snaps to which; free of kernels."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Transition(Checked):
     end: Text | None  # a minimum; None: it came to no rest
     stiffness: Number  # eigenvalue of the mode pushed along, GJ/a^2, < 0
     sign: Integer  # of the push
-    via: tuple[Text, ...]  # saddles on which symmetry let it rest, before it was nudged on
+    via: tuple[Text, ...]  # saddles where its symmetry held it, until it was perturbed
     released: Number | None  # energy, GJ/a
 
 
@@ -87,15 +87,10 @@ class States(Record):
                 if name not in names:
                     raise ValueError(f"transitions must be between states, got {name!r}")
 
-    def facts(self) -> dict[str, str]:
-        """Which ring, how many states, and how the search ended."""
-        return {
-            "ring": str(self.ring.get("shape")),
-            "grips": "free" if self.gamma is None else f"gamma={self.gamma:.6g}",
-            "states": f"{len(self)} states",
-            "minima": f"{len(self.minima)} minima",
-            "status": self.status,
-        }
+    def facts(self) -> list[str]:
+        """How many states, and where."""
+        place = "free" if self.gamma is None else f"gamma={self.gamma:.6g}"
+        return [place, f"{len(self)} states", f"{len(self.minima)} minima"]
 
     def __len__(self) -> int:
         return len(self.states)
@@ -112,6 +107,6 @@ class States(Record):
         return tuple(state for state in self.states if state.stable)
 
     def falls_to(self, name: str) -> tuple[str, ...]:
-        """The minima that a state falls to, each once."""
+        """The minima that a state snaps to, each once."""
         ends = [fall.end for fall in self.transitions if fall.start == name]
         return tuple(dict.fromkeys(end for end in ends if end is not None))

@@ -1,4 +1,4 @@
-"""Pictures, films and playbacks of records.
+"""Pictures, motions and playbacks of records.
 
 May import records, geometry and utils; never a solver.
 Begin with plots/path.py.

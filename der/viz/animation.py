@@ -1,4 +1,4 @@
-"""A path as a film: all that is to be shown, one entry a step, as arrays.
+"""A path as a motion: all that is to be shown, one entry a step, as arrays.
 
 States are those of the path, in its order; those of a snap, between two of them, are put in from
 the falls that its shapes hold. Free of rerun, which only sends what is worked out here.
@@ -33,8 +33,8 @@ class Section:
 
 
 @dataclass(frozen=True, eq=False)
-class Playback:
-    """All that is shown, one entry a step of the film."""
+class Motion:
+    """All that is shown, one entry a step of the motion."""
 
     x: Array  # (n, N, 3) vertices
     frames: Array  # (n, N, 3, 3) material frames of the edges
@@ -59,12 +59,12 @@ class Playback:
         return float(self.density[:, self.position >= 0].max()) or 1.0
 
     def step_of(self, position: int) -> int:
-        """The step of the film that shows a state of the path."""
+        """The step of the motion that shows a state of the path."""
         return int(np.flatnonzero(self.position == position)[0])
 
 
-def playback(path: Path, *, rest: Array | None = None) -> Playback:
-    """The film of a path: its states, with its falls put in between.
+def animate(path: Path, *, rest: Array | None = None) -> Motion:
+    """The motion of a path: its states, with its falls put in between.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def playback(path: Path, *, rest: Array | None = None) -> Playback:
         )
     )
     values = np.empty((n, 0)) if softest is None else softest.eigenvalues
-    return Playback(
+    return Motion(
         x=x,
         frames=frames,
         position=position,
@@ -115,13 +115,13 @@ def playback(path: Path, *, rest: Array | None = None) -> Playback:
 
 
 def _order(n: int, falls: Sequence[Fall]) -> NDArray[np.int64]:
-    """Places, in the `n` states followed by all falls, of the film's steps."""
+    """Places, in the `n` states followed by all falls, of the motion's steps."""
     after = [np.full(len(fall.x), fall.after + 0.5) for fall in falls]
     return np.argsort(np.concatenate([np.arange(n), *after]), kind="stable")
 
 
 def spread(values: Array, position: NDArray[np.int64]) -> Array:
-    """Values of the states at every step of the film, nan in the middle of a fall."""
+    """Values of the states at every step of the motion, nan in the middle of a fall."""
     out = np.asarray(values, dtype=float)[position]
     out[position < 0] = np.nan
     return out
@@ -137,7 +137,7 @@ def middles(x: Array) -> Array:
     return 0.5 * (x + np.roll(x, 1, axis=-2))
 
 
-def grips(film: Playback, radius: float, points: int) -> Array:
+def grips(motion: Motion, radius: float, points: int) -> Array:
     """How far each grip has turned: arcs, and its own middle last, (2, n, points + 1, 3).
 
     Parameters
@@ -145,14 +145,14 @@ def grips(film: Playback, radius: float, points: int) -> Array:
     radius : of the arcs, over the ring's mean radius.
     points : on each arc, from where the grip began to where it is.
     """
-    n_v = film.x.shape[1]
-    middle = middles(film.x)
+    n_v = motion.x.shape[1]
+    middle = middles(motion.x)
     found = []
     for edge, sign in ((0, 1.0), (n_v // 2, -1.0)):
-        centre, d1 = middle[:, edge], film.frames[0, edge, 0]
+        centre, d1 = middle[:, edge], motion.frames[0, edge, 0]
         across = np.cross([0.0, 0.0, 1.0], d1)
-        turned = np.linspace(0.0, sign * film.gamma, points, axis=1)[..., None]
-        arc = radius * film.size * (np.cos(turned) * d1 + np.sin(turned) * across)
+        turned = np.linspace(0.0, sign * motion.gamma, points, axis=1)[..., None]
+        arc = radius * motion.size * (np.cos(turned) * d1 + np.sin(turned) * across)
         found.append(np.concatenate([centre[:, None] + arc, centre[:, None]], axis=1))
     return np.array(found)
 

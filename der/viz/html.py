@@ -1,7 +1,7 @@
-"""A path as one page that any browser opens, offline: the ring to be turned about and scrubbed.
+"""A path as one page that any browser opens, offline: the ring turns, a slider moves it.
 
-plotly draws; the page carries its code, and all states as packed numbers. What moves is moved by
-`html_page.js`, which is put into the page.
+plotly draws. The page carries plotly's code and all states as packed numbers. `html_page.js`, which
+is put into the page, moves the ring, the dots and the captions.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import json
 import math
 from collections.abc import Sequence
 from importlib.resources import files
-from pathlib import Path as File
 from typing import Any
 
 import numpy as np
@@ -21,25 +20,18 @@ from numpy.typing import ArrayLike
 
 from der.records.path import Path
 from der.utils.checks import Array
-from der.utils.files import FilePath, write_whole
-from der.viz.animation import Playback, grips
-from der.viz.captions import WORDS, about, captions, names
-from der.viz.curve import SNAP, stretches
+from der.utils.files import FilePath
+from der.viz.animation import Motion, grips
+from der.viz.captions import about, captions
+from der.viz.curve import stretches
+from der.viz.files import checked_suffix, write
+from der.viz.palette import INK, PAIR, PALE, POINTS, QUIET, STRETCHES
+from der.viz.resampling import in_step, one_or_two
 from der.viz.ribbon import VIRIDIS, ribbon, triangles
-from der.viz.tween import in_step
+from der.viz.titles import names
 
 SUFFIX = ".html"
-GAMMA = "\N{GREEK SMALL LETTER GAMMA}"
 FRAMES = 160  # steps of the slider, special points besides
-INK, QUIET, PALE = "#222222", "#767676", "#e4e4e4"
-STABLE, UNSTABLE, FALLING = "#0072B2", "#D55E00", "#8a8a8a"  # Okabe and Ito
-STRETCHES: dict[bool | str | None, tuple[str, str, str]] = {
-    True: ("stable", STABLE, "solid"),
-    False: ("unstable", UNSTABLE, "dash"),
-    None: ("equilibria", STABLE, "solid"),
-    SNAP: ("the ring snaps", FALLING, "dot"),
-}
-PAIR = (STABLE, "#CC79A7")  # of two rings, whose curves share panels
 POINTER, ARC = 0.42, 13  # length of a grip's arrow over the mean radius; points on its arc
 REACH = 1.3  # half the length of the twisting axis, over the farthest point along it
 AXES = {"moment": {"xaxis": "x", "yaxis": "y"}, "energy": {"xaxis": "x2", "yaxis": "y2"}}
@@ -47,11 +39,11 @@ EYE = {"x": 1.14, "y": 0.64, "z": 0.48}
 
 
 def save_html(path: Path | Sequence[Path], file: FilePath, *, frames: int = FRAMES) -> None:
-    """Write the page of a path, or of two beside each other, whole or not at all.
+    """Write the page of a path, or of two beside each other, atomically.
 
     Parameters
     ----------
-    path : with shapes; of two, both move at equal gamma wherever there are any (`tween.in_step`).
+    path : with shapes; two of them move at equal gamma where they can (`resampling.in_step`).
     file : .html.
     frames : steps of the slider, special points besides.
 
@@ -62,18 +54,12 @@ def save_html(path: Path | Sequence[Path], file: FilePath, *, frames: int = FRAM
         shapes, or there are more than two.
     """
     check_html(file)
-    content = page(path, frames=frames).encode()
-    try:
-        write_whole(file, lambda opened: opened.write(content))
-    except OSError as problem:
-        reason = problem.strerror or problem
-        raise ValueError(f"html {str(file)!r} cannot be written: {reason}") from problem
+    write("html", file, page(path, frames=frames).encode())
 
 
 def check_html(file: FilePath) -> None:
     """Refuse, before anything is solved, a file that no page can be written to."""
-    if File(file).suffix.lower() != SUFFIX:
-        raise ValueError(f"html must end in {SUFFIX}, got {str(file)!r}")
+    checked_suffix("html", file, [SUFFIX])
     if importlib.util.find_spec("plotly") is None:
         raise ValueError(
             f"html {str(file)!r} needs the package plotly, which is not installed: "
@@ -85,20 +71,16 @@ def page(path: Path | Sequence[Path], *, frames: int = FRAMES) -> str:
     """The page of a path, or of two beside each other; arguments as in `save_html`."""
     from plotly.offline import get_plotlyjs
 
-    paths = [path] if isinstance(path, Path) else list(path)
-    if len(paths) not in (1, 2):
-        raise ValueError(f"path must be one or two, got {len(paths)}")
-    if frames < 2:
-        raise ValueError(f"frames must be at least 2, got {frames!r}")
-    films = in_step(paths, frames)
+    paths = one_or_two(path)
+    motions = in_step(paths, frames)
     colours = PAIR if len(paths) == 2 else (INK,)
     rings = [
-        _ring(path, film, name, colour)
-        for path, film, name, colour in zip(paths, films, names(paths), colours, strict=True)
+        _ring(path, motion, name, colour)
+        for path, motion, name, colour in zip(paths, motions, names(paths), colours, strict=True)
     ]
-    data = {"figure": _figure(paths, films, colours), "rings": rings}
+    data = {"figure": _figure(paths, motions, colours), "rings": rings}
     head, body = "ring-origami: " + " and ".join(names(paths)), files("der.viz") / "html_page.html"
-    texts = [about(path, film) for path, film in zip(paths, films, strict=True)]
+    texts = [about(path, motion) for path, motion in zip(paths, motions, strict=True)]
     parts = {
         "TITLE": html.escape(head),
         "DATA": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
@@ -117,26 +99,26 @@ def packed(values: ArrayLike, kind: str = "f4") -> str:
     return base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()
 
 
-def _ring(path: Path, film: Playback, name: str, colour: str) -> dict[str, Any]:
+def _ring(path: Path, motion: Motion, name: str, colour: str) -> dict[str, Any]:
     """All that changes from step to step."""
-    positions, _ = ribbon(film.x, film.frames, film.section)
-    said = captions(path, film)
+    positions, _ = ribbon(motion.x, motion.frames, motion.section)
+    said = captions(path, motion)
     return {
         "name": name,
         "colour": colour,
-        "sections": film.x.shape[1],
+        "sections": motion.x.shape[1],
         "positions": packed(positions[:, ::2]),  # each corner is there twice, once for either face
-        "grips": packed(np.moveaxis(grips(film, POINTER, ARC), 0, 1)),
+        "grips": packed(np.moveaxis(grips(motion, POINTER, ARC), 0, 1)),
         "arc": ARC + 1,
-        "density": packed(film.density.sum(axis=0)),
-        "gamma": packed(film.gamma / math.pi, "f8"),
-        "moment": packed(film.moment, "f8"),
-        "energy": packed(film.energy, "f8"),
+        "density": packed(motion.density.sum(axis=0)),
+        "gamma": packed(motion.gamma / math.pi, "f8"),
+        "moment": packed(motion.moment, "f8"),
+        "energy": packed(motion.energy, "f8"),
         "numbers": [one.numbers for one in said],
         "stability": [one.line for one in said],
         "stable": [one.stable for one in said],
         "events": [one.event for one in said],
-        "marks": sorted({film.step_of(point.position) for point in path.points}),
+        "marks": sorted({motion.step_of(point.position) for point in path.points}),
     }
 
 
@@ -144,14 +126,14 @@ def _ring(path: Path, film: Playback, name: str, colour: str) -> dict[str, Any]:
 
 
 def _figure(
-    paths: Sequence[Path], films: Sequence[Playback], colours: Sequence[str]
+    paths: Sequence[Path], motions: Sequence[Motion], colours: Sequence[str]
 ) -> dict[str, Any]:
     """plotly's figure: what moves are meshes and grips, which come first, and dots, last."""
     two = len(paths) == 2
-    traces = [_mesh(film, k, films) for k, film in enumerate(films)]
-    traces += [_line(k, INK, 5.0, [0.0], "grips") for k in range(len(films))]
-    for k, film in enumerate(films):
-        end = REACH * float(np.abs(film.x[..., 2]).max())
+    traces = [_mesh(motion, k, motions) for k, motion in enumerate(motions)]
+    traces += [_line(k, INK, 5.0, [0.0], "grips") for k in range(len(motions))]
+    for k, motion in enumerate(motions):
+        end = REACH * float(np.abs(motion.x[..., 2]).max())
         traces.append(_line(k, QUIET, 1.5, [-end, end], "twisting axis"))
     for name in AXES:
         for path, colour, called in zip(paths, colours, names(paths), strict=True):
@@ -165,34 +147,34 @@ def _figure(
             dot: dict[str, Any] = {"type": "scatter", "mode": "markers", "marker": marker}
             dot |= {"x": [0.0], "y": [0.0], "name": f"present {name}", "cliponaxis": False}
             traces.append(dot | {"showlegend": False, "hoverinfo": "skip"} | AXES[name])
-    return {"data": traces, "layout": _layout(paths, films)}
+    return {"data": traces, "layout": _layout(paths, motions)}
 
 
-def _mesh(film: Playback, k: int, films: Sequence[Playback]) -> dict[str, Any]:
+def _mesh(motion: Motion, k: int, motions: Sequence[Motion]) -> dict[str, Any]:
     """The ribbon, coloured by its energy; vertices are put in by the page."""
-    i, j, m = triangles(film.x.shape[1]).T
+    i, j, m = triangles(motion.x.shape[1]).T
     shades = [[n / 8, f"rgb{tuple(int(v) for v in c)}"] for n, c in enumerate(VIRIDIS)]
     bar = {
         "title": {"text": "energy per length, GJ/a²", "side": "right", "font": {"size": 11}},
         "thickness": 9,
         "len": 0.55,
-        "x": 0.0 if len(films) == 1 else 0.487,
-        "xanchor": "left" if len(films) == 1 else "center",
+        "x": 0.0 if len(motions) == 1 else 0.487,
+        "xanchor": "left" if len(motions) == 1 else "center",
         "outlinewidth": 0,
         "tickfont": {"size": 10},
     }
-    if len(films) == 2:
+    if len(motions) == 2:
         bar["y"] = 0.72
     return {
         "type": "mesh3d",
         "scene": "scene" if k == 0 else "scene2",
         **{name: v.tolist() for name, v in (("i", i), ("j", j), ("k", m))},
-        "x": [0.0] * (8 * film.x.shape[1]),
-        "y": [0.0] * (8 * film.x.shape[1]),
-        "z": [0.0] * (8 * film.x.shape[1]),
-        "intensity": [0.0] * (8 * film.x.shape[1]),
+        "x": [0.0] * (8 * motion.x.shape[1]),
+        "y": [0.0] * (8 * motion.x.shape[1]),
+        "z": [0.0] * (8 * motion.x.shape[1]),
+        "intensity": [0.0] * (8 * motion.x.shape[1]),
         "cmin": 0.0,
-        "cmax": max(float(one.density[:, one.position >= 0].sum(axis=0).max()) for one in films)
+        "cmax": max(float(one.density[:, one.position >= 0].sum(axis=0).max()) for one in motions)
         or 1.0,
         "colorscale": shades,
         "showscale": k == 0,
@@ -228,24 +210,24 @@ def _curve(
     traces: list[dict[str, Any]] = []
     said: set[object] = set()
     for kind, points in stretches(path, heights):
-        words, colour, dash = STRETCHES[kind]
-        text = f"{label}, {words}" if label else words
-        line = {"color": own or colour, "dash": dash, "width": 2.2, "simplify": False}
+        look = STRETCHES[kind]
+        text = f"{label}, {look.label}" if label else look.label
+        line = {"color": own or look.colour, "dash": look.dash, "width": 2.2, "simplify": False}
         trace: dict[str, Any] = {"type": "scatter", "mode": "lines", "line": line, "name": text}
         trace |= {"x": points[:, 0].tolist(), "y": points[:, 1].tolist()}
         trace |= {"legendgroup": text, "showlegend": legend and kind not in said}
-        trace["hovertemplate"] = f"{GAMMA} = %{{x:.4f}} π<br>%{{y:.4f}}<extra></extra>"
+        trace["hovertemplate"] = "γ = %{x:.4f} π<br>%{y:.4f}<extra></extra>"
         traces.append(trace)
         said.add(kind)
     at = [point.position for point in path.points]
     if at:
         marker = {"size": 7, "color": "white", "line": {"color": own or INK, "width": 1.4}}
-        kinds = [WORDS[point.kind] for point in path.points]
+        kinds = [POINTS[point.kind] for point in path.points]
         marks: dict[str, Any] = {"type": "scatter", "mode": "markers", "marker": marker}
         marks["text"] = kinds
         marks |= {"x": (path.gamma[at] / math.pi).tolist(), "y": heights[at].tolist()}
         marks |= {"name": "special points", "showlegend": False}
-        marks["hovertemplate"] = f"%{{text}}<br>{GAMMA} = %{{x:.6f}} π<br>%{{y:.6f}}<extra></extra>"
+        marks["hovertemplate"] = "%{text}<br>γ = %{x:.6f} π<br>%{y:.6f}<extra></extra>"
         traces.append(marks)
     return traces
 
@@ -258,11 +240,11 @@ def _range(paths: Sequence[Path], name: str) -> list[float]:
     return [low - room, high + room]
 
 
-def _layout(paths: Sequence[Path], films: Sequence[Playback]) -> dict[str, Any]:
+def _layout(paths: Sequence[Path], motions: Sequence[Motion]) -> dict[str, Any]:
     """Where the views lie, and in which limits: these never change."""
-    two = len(films) == 2
+    two = len(motions) == 2
     turns = [value / math.pi for value in _range(paths, "gamma")]
-    reach = max(float(np.abs(film.x).max()) + 0.6 * film.section.h for film in films)
+    reach = max(float(np.abs(motion.x).max()) + 0.6 * motion.section.h for motion in motions)
     side = {"range": [-reach, reach], "visible": False}
     scene = {
         **{f"{name}axis": dict(side) for name in "xyz"},
@@ -292,7 +274,7 @@ def _layout(paths: Sequence[Path], films: Sequence[Playback]) -> dict[str, Any]:
         panels = [([0.6, 1.0], [0.55, 1.0]), ([0.6, 1.0], [0.0, 0.45])]
     scenes = {name: scene | {"domain": {"x": x, "y": y}} for name, (x, y) in domains.items()}
     (mx, my), (ux, uy) = panels
-    turned = f"rotation of a grip, {GAMMA}/π"
+    turned = "rotation of a grip, γ/π"
     return {
         **scenes,
         "xaxis": labelled(turned, domain=mx, anchor="y", range=turns),

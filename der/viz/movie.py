@@ -1,7 +1,7 @@
-"""A path as a film for those without a viewer: the ring beside M(gamma) and U(gamma).
+"""A path as a movie: the ring beside M(gamma) and U(gamma).
 
-GIF by Pillow, MP4 by ffmpeg, both through matplotlib's writers. What stands still is drawn once;
-what moves is drawn on a copy of it, and the writer is shown the finished picture.
+GIF by Pillow, MP4 by ffmpeg, both through matplotlib's writers. What never changes is drawn once;
+what moves is drawn on a copy of it, and the writer gets the finished picture.
 """
 
 from __future__ import annotations
@@ -27,15 +27,26 @@ from matplotlib.transforms import Bbox
 
 from der.records.path import Path
 from der.utils.checks import Array
-from der.utils.files import FilePath, write_whole
-from der.viz.animation import Playback, grips
-from der.viz.captions import captions, names
-from der.viz.curve import SNAP, stretches
-from der.viz.palette import DASHES, INK, QUIET, STABLE, UNSTABLE
-from der.viz.ribbon import HALF_WIDTH
-from der.viz.ribbon import projected as flat
-from der.viz.ribbon import quadrilaterals as seen
-from der.viz.tween import in_step
+from der.utils.files import FilePath
+from der.viz.animation import Motion, grips
+from der.viz.captions import captions
+from der.viz.files import checked_suffix, write
+from der.viz.palette import INK, PAIR, QUIET, STABLE, UNSTABLE
+from der.viz.plots.style import (
+    ENERGY,
+    GAMMA,
+    MOMENT,
+    draw_stretches,
+    entry,
+    label_axes,
+    legend_below,
+    mark,
+    stretch_entries,
+    zero_line,
+)
+from der.viz.resampling import in_step, one_or_two
+from der.viz.ribbon import HALF_WIDTH, projected, quadrilaterals
+from der.viz.titles import names
 
 FORMATS = (".gif", ".mp4")
 SIZE, DPI = (8.0, 4.5), 100  # inches; 800 x 450 px
@@ -43,14 +54,6 @@ CODEC = "libx264"  # of an MP4
 FPS = 15
 FRAMES = 105  # and what special points add: seven seconds
 REST = 0.8  # seconds that the first and the last picture stay
-PALE, FALLING = "#d9d9d9", QUIET
-STRETCHES: dict[bool | str | None, tuple[str, str, Any]] = {
-    True: ("stable", STABLE, "-"),
-    False: ("unstable", UNSTABLE, DASHES),
-    None: ("equilibria", STABLE, "-"),
-    SNAP: ("the ring snaps", FALLING, (0, (1.2, 1.4))),
-}
-PAIR = (STABLE, "#CC79A7")  # of two rings, whose curves share panels
 POINTER = 0.42  # length of a grip's arrow, over the ring's mean radius
 ARC = 25  # points on the arc that shows how far it has turned
 
@@ -58,11 +61,11 @@ ARC = 25  # points on the arc that shows how far it has turned
 def save_movie(
     path: Path | Sequence[Path], file: FilePath, *, fps: int = FPS, frames: int = FRAMES
 ) -> None:
-    """Write the film of a path, or of two beside each other, whole or not at all.
+    """Write the movie of a path, or of two beside each other, atomically.
 
     Parameters
     ----------
-    path : with shapes; of two, both move at equal gamma wherever there are any (`tween.in_step`).
+    path : with shapes; two of them move at equal gamma where they can (`resampling.in_step`).
     file : .gif, which needs nothing, or .mp4, which needs ffmpeg.
     fps : pictures a second.
     frames : pictures, special points besides.
@@ -73,21 +76,15 @@ def save_movie(
         If the suffix is another, ffmpeg is missing, the place cannot be written to, a path has no
         shapes, or there are more than two.
     """
-    paths = [path] if isinstance(path, Path) else list(path)
     check_movie(file)
     if not 1 <= fps <= 60:
         raise ValueError(f"fps must be from 1 to 60, got {fps!r}")
-    if len(paths) not in (1, 2):
-        raise ValueError(f"path must be one or two, got {len(paths)}")
-    if frames < 2:
-        raise ValueError(f"frames must be at least 2, got {frames!r}")
-    stage = _Stage(paths, in_step(paths, frames), fps)
+    paths = one_or_two(path)
+    figure = MovieFigure(paths, in_step(paths, frames), fps)
     with tempfile.TemporaryDirectory() as folder:
-        made = File(folder) / f"film{File(file).suffix.lower()}"
+        made = File(folder) / f"movie{File(file).suffix.lower()}"
         try:
-            _write(stage, made, fps)
-            content = made.read_bytes()
-            write_whole(file, lambda opened: opened.write(content))
+            _encode(figure, made, fps)
         except subprocess.CalledProcessError as problem:
             raise ValueError(
                 f"movie {str(file)!r} cannot be written: ffmpeg ended with code "
@@ -96,13 +93,12 @@ def save_movie(
         except OSError as problem:
             reason = problem.strerror or problem
             raise ValueError(f"movie {str(file)!r} cannot be written: {reason}") from problem
+        write("movie", file, made.read_bytes())
 
 
 def check_movie(file: FilePath) -> None:
-    """Refuse, before anything is solved, a file that no film can be written to."""
-    suffix = File(file).suffix.lower()
-    if suffix not in FORMATS:
-        raise ValueError(f"movie must end in {', '.join(FORMATS)}, got {str(file)!r}")
+    """Refuse, before anything is solved, a file that no movie can be written to."""
+    suffix = checked_suffix("movie", file, FORMATS)
     if suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise ValueError(
             f"movie {str(file)!r} needs the program ffmpeg, which is not installed here; "
@@ -110,8 +106,8 @@ def check_movie(file: FilePath) -> None:
         )
 
 
-def _write(stage: _Stage, file: File, fps: int) -> None:
-    """Show the pictures to the writer of the file's kind."""
+def _encode(figure: MovieFigure, file: File, fps: int) -> None:
+    """Give the pictures to the writer of the file's kind."""
     screen = _Screen(figsize=SIZE, dpi=DPI)
     writer: FFMpegWriter | PillowWriter
     if file.suffix == ".gif":
@@ -120,7 +116,7 @@ def _write(stage: _Stage, file: File, fps: int) -> None:
         more = ["-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart"]
         writer = FFMpegWriter(fps=fps, codec=CODEC, extra_args=more)
     with writer.saving(screen, str(file), DPI):
-        for screen.picture in stage.pictures():
+        for screen.picture in figure.pictures():
             writer.grab_frame()
 
 
@@ -134,17 +130,17 @@ class _Screen(Figure):
         fname.write(self.picture)
 
 
-# --- The stage -------------------------------------------------------------------------------
+# --- Pictures --------------------------------------------------------------------------------
 
 
 class _Ring:
-    """One ring on the stage: what moves in its picture and in both panels."""
+    """One ring: what moves in its picture and on both curves."""
 
-    def __init__(self, path: Path, film: Playback, colour: str, panels: Sequence[Axes]) -> None:
-        self.film = film
-        self.said = captions(path, film)
-        self.pointers = grips(film, POINTER, ARC)
-        self.width = HALF_WIDTH * film.size
+    def __init__(self, path: Path, motion: Motion, colour: str, curves: Sequence[Axes]) -> None:
+        self.motion = motion
+        self.said = captions(path, motion)
+        self.pointers = grips(motion, POINTER, ARC)
+        self.width = HALF_WIDTH * motion.size
         self.ribbon: Any = PolyCollection([], linewidths=0.5)
         look: dict[str, Any] = {
             "color": INK,
@@ -154,7 +150,7 @@ class _Ring:
         }
         self.arrows = [Line2D([], [], **look) for _ in range(2)]
         self.dots = [
-            panel.plot(
+            axes.plot(
                 [],
                 [],
                 "o",
@@ -165,16 +161,16 @@ class _Ring:
                 markeredgecolor="white",
                 markeredgewidth=1.3,
             )[0]
-            for panel in panels
+            for axes in curves
         ]
-        self.words: list[Any] = []
+        self.texts: list[Any] = []
 
     @property
     def reach(self) -> Array:
         """Least and largest coordinates (2, 2) of the picture, at all times."""
         pads = self.width * np.array([[-1.3], [1.3]])
-        places = [flat(self.film.x.reshape(-1, 3)) + pad for pad in pads]
-        everything = np.concatenate([*places, flat(self.pointers.reshape(-1, 3))])
+        places = [projected(self.motion.x.reshape(-1, 3)) + pad for pad in pads]
+        everything = np.concatenate([*places, projected(self.pointers.reshape(-1, 3))])
         return np.stack([everything.min(axis=0), everything.max(axis=0)])
 
     def place(self, row: Axes, reach: Array) -> None:
@@ -183,8 +179,8 @@ class _Ring:
         row.set_ylim(*reach[:, 1])
         row.set_aspect("equal")
         row.set_axis_off()
-        z = 1.25 * float(np.abs(self.film.x[..., 2]).max())
-        axis = flat(np.array([[0.0, 0.0, -z], [0.0, 0.0, z]]))
+        z = 1.25 * float(np.abs(self.motion.x[..., 2]).max())
+        axis = projected(np.array([[0.0, 0.0, -z], [0.0, 0.0, z]]))
         dashed: Any = (0, (6, 2, 1, 2))
         row.plot(*axis.T, color=QUIET, linewidth=0.8, linestyle=dashed, zorder=0, clip_on=False)
         row.add_collection(self.ribbon, autolim=False)
@@ -193,49 +189,51 @@ class _Ring:
 
     def show(self, step: int) -> Iterator[Any]:
         """Move everything to a step, and hand out what has been moved, in the order of drawing."""
-        film, said = self.film, self.said[step]
-        corners, colours = seen(film.x[step], film.frames[step, :, 0], self.width)
+        motion, said = self.motion, self.said[step]
+        corners, colours = quadrilaterals(motion.x[step], motion.frames[step, :, 0], self.width)
         self.ribbon.set_verts(corners)
         self.ribbon.set_facecolor(colours)
         self.ribbon.set_edgecolor(colours)
         yield self.ribbon
         for grip, line in enumerate(self.arrows):
-            line.set_data(*flat(self.pointers[grip, step]).T)
+            line.set_data(*projected(self.pointers[grip, step]).T)
             yield line
-        for dot, value in zip(self.dots, (film.moment[step], film.energy[step]), strict=True):
-            dot.set_data([film.gamma[step] / math.pi], [value])
+        for dot, value in zip(self.dots, (motion.moment[step], motion.energy[step]), strict=True):
+            dot.set_data([motion.gamma[step] / math.pi], [value])
             yield dot
         colour = {True: STABLE, False: UNSTABLE, None: QUIET}[said.stable]
-        self.words[1].set_color(colour)
-        for text, words in zip(self.words, (said.numbers, said.line, said.event), strict=True):
-            text.set_text(words)
+        self.texts[1].set_color(colour)
+        for text, now in zip(self.texts, (said.numbers, said.line, said.event), strict=True):
+            text.set_text(now)
             yield text
 
 
-class _Stage:
-    """The figure with all that stands still, and the pictures made on it."""
+class MovieFigure:
+    """The figure with all that never changes, and the pictures made on it."""
 
-    def __init__(self, paths: Sequence[Path], films: Sequence[Playback], fps: int) -> None:
+    def __init__(self, paths: Sequence[Path], motions: Sequence[Motion], fps: int) -> None:
         self.figure = Figure(figsize=SIZE, dpi=DPI, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
         self.hold = round(REST * fps)
         two = len(paths) == 2
-        rows, panels = self._two() if two else self._one()
+        rows, curves = self._two() if two else self._one()
         colours = PAIR if two else (INK,)
         called = names(paths)
         self.rings = []
-        for path, film, row, colour, name in zip(paths, films, rows, colours, called, strict=True):
-            ring = _Ring(path, film, colour, panels)
+        for path, motion, row, colour, name in zip(
+            paths, motions, rows, colours, called, strict=True
+        ):
+            ring = _Ring(path, motion, colour, curves)
             box = row.get_position(original=True)
             self._say(ring, box, name, colour if two else INK)
-            for panel, height in zip(panels, (path.moment, path.energy), strict=True):
-                _draw(panel, path, height, colour if two else None)
+            for axes, height in zip(curves, (path.moment, path.energy), strict=True):
+                _draw(axes, path, height, colour if two else None)
             self.rings.append(ring)
         reach = np.array([ring.reach for ring in self.rings])  # one scale for both
         limits = np.stack([reach[:, 0].min(axis=0), reach[:, 1].max(axis=0)])
         for ring, row in zip(self.rings, rows, strict=True):
             ring.place(row, limits)
-        _dress(panels, beside=two)
+        _label(curves, beside=two)
         self._legend(paths, called, two=two)
         for ring in self.rings:
             for artist in ring.show(0):
@@ -266,41 +264,27 @@ class _Stage:
             head.set_text("\n".join(textwrap.wrap(name, -(-len(name) // 2) + 6)))
             room = box.width * self.figure.bbox.width / head.get_window_extent().width
             head.set(fontsize=min(8.5, 10.0 * room), y=0.96, linespacing=1.05)
-        ring.words = [
+        ring.texts = [
             self.figure.text(x, 0.905, "", fontsize=9.5, color=INK, **look),
             self.figure.text(x, 0.862, "", fontsize=9, color=INK, **look),
             self.figure.text(x, 0.822, "", fontsize=8.5, color=INK, fontstyle="italic", **look),
         ]
 
     def _legend(self, paths: Sequence[Path], called: Sequence[str], *, two: bool) -> None:
-        kinds = {kind for path in paths for kind, _ in stretches(path, path.energy)}
-        handles = []
-        if two:
-            handles = [
-                Line2D([], [], color=colour, marker="o", label=name)
-                for colour, name in zip(PAIR, called, strict=True)
-            ]
-        for kind, (label, colour, style) in STRETCHES.items():
-            if kind in kinds and not (two and kind in (True, None)):
-                colour = QUIET if two else colour
-                handles.append(Line2D([], [], color=colour, linestyle=style, label=label))
-        self.figure.legend(
-            handles=handles,
-            loc="lower center",
-            bbox_to_anchor=(0.5 if two else 0.775, 0.0),
-            ncols=4,
-            frameon=False,
-            fontsize=7.5,
-            handlelength=2.2,
-            columnspacing=1.4,
-            labelcolor=INK,
-        )
+        handles = list(stretch_entries(*paths))
+        if two:  # curves have the colours of their rings
+            handles = [one for one in handles if one.get_linestyle() != "-"]
+            for one in handles:
+                one.set_color(QUIET)
+            rings = zip(PAIR, called, strict=True)
+            handles = [*(entry(name, color=c, marker="o") for c, name in rings), *handles]
+        legend_below(self.figure, handles, fontsize=7.5)
 
     def pictures(self) -> Iterator[bytes]:
-        """Every picture of the film, RGBA; the ends stay for a while."""
+        """Every picture of the motion, RGBA; the ends stay for a while."""
         self.canvas.draw()
         still = self.canvas.copy_from_bbox(self.figure.bbox)
-        last = len(self.rings[0].film.x) - 1
+        last = len(self.rings[0].motion.x) - 1
         for step in [0] * self.hold + list(range(last + 1)) + [last] * self.hold:
             self.canvas.restore_region(still)
             for ring in self.rings:
@@ -309,39 +293,25 @@ class _Stage:
             yield bytes(self.canvas.buffer_rgba())
 
 
-def _draw(panel: Axes, path: Path, height: Array, colour: str | None) -> None:
-    """The curve of one path; in a colour of its own where it shares the panel."""
-    for kind, points in stretches(path, height):
-        _, own, style = STRETCHES[kind]
-        panel.plot(*points.T, color=colour or own, linestyle=style, linewidth=1.6, zorder=2)
+def _draw(axes: Axes, path: Path, height: Array, colour: str | None) -> None:
+    """The curve of one path; in a colour of its own where it shares the axes."""
+    draw_stretches(axes, path, height, colour)
     at = [point.position for point in path.points if point.kind in ("fold", "limit", "snap")]
-    panel.plot(
-        path.gamma[at] / math.pi,
-        height[at],
-        "o",
-        markersize=3.0,
-        zorder=3,
-        markerfacecolor="white",
-        markeredgecolor=colour or INK,
-        markeredgewidth=0.9,
-    )
+    look = mark("o", 3.0) | {"markeredgecolor": colour or INK}
+    axes.plot(path.gamma[at] / math.pi, height[at], zorder=3, **look)
 
 
-def _dress(panels: Sequence[Axes], *, beside: bool) -> None:
-    """Axes, ticks and labels."""
-    for panel, label in zip(panels, ("moment  $M\\,a/GJ$", "energy  $U\\,a/GJ$"), strict=True):
-        panel.set_ylabel(label, fontsize=8.5, color=INK)
-        panel.margins(x=0.03, y=0.1)
-        panel.tick_params(labelsize=7.5, color=QUIET, labelcolor=INK, direction="in")
-        panel.spines[["top", "right"]].set_visible(False)
-        panel.spines[["left", "bottom"]].set_color(QUIET)
-        panel.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
-        panel.yaxis.set_major_locator(MaxNLocator(4))
-        panel.set_xlabel("rotation of a grip  $\\gamma/\\pi$", fontsize=8.5, color=INK)
-    panels[0].axhline(0.0, color=PALE, linewidth=0.7, zorder=0)
+def _label(curves: Sequence[Axes], *, beside: bool) -> None:
+    """Labels and ticks of the axes of M and U."""
+    for axes, label in zip(curves, (MOMENT, ENERGY), strict=True):
+        label_axes(axes, GAMMA, label, fontsize=8.5)
+        axes.margins(x=0.03, y=0.1)
+        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+        axes.yaxis.set_major_locator(MaxNLocator(4))
+    zero_line(curves[0])
     if not beside:
-        panels[0].set_xlabel("")
-        panels[0].tick_params(labelbottom=False)
-        panels[1].set_xlim(panels[0].get_xlim())
-        for panel in panels:
-            panel.yaxis.set_label_coords(-0.105, 0.5)
+        curves[0].set_xlabel("")
+        curves[0].tick_params(labelbottom=False)
+        curves[1].set_xlim(curves[0].get_xlim())
+        for axes in curves:
+            axes.yaxis.set_label_coords(-0.105, 0.5)

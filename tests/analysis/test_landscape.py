@@ -19,13 +19,7 @@ from der.analysis.landscape.over_thickness import barriers_over
 from der.analysis.landscape.surface import energy_surface
 from der.records.energy_surface import Surface
 from der.records.landscape import BarrierCurves, Landscape, Pass
-from der.viz.plots.energy_surface import figure_of_surface
-from der.viz.plots.landscape import (
-    figure_of_barriers,
-    figure_of_landscape,
-    figure_of_pass,
-)
-from der.viz.plots.style import save_figure
+from der.viz.plots.style import save
 
 
 def scene(h_over_t=4.0, ring=None, **numerics):
@@ -197,13 +191,13 @@ def test_json_of_a_pass():
 def test_pictures_show_extrapolated_barriers():
     """Where there are error bars; the mesh's value beside them, else it alone. GJ/a throughout."""
     plain, sure = along(8.0), {"open": (0.0210883, 5.2e-4), "fold": (9.7169, 5.2e-4)}
-    said = "|".join(t.get_text() for t in figure_of_landscape(plain).findobj(Text))
+    said = "|".join(t.get_text() for t in plain.plot().findobj(Text))
     assert f"to open\n{plain.barriers.open:.4g} GJ/a" in said
     assert "extrapolated" not in said
-    figure = figure_of_landscape(replace(plain, extrapolated=sure))
+    figure = replace(plain, extrapolated=sure).plot()
     said = "|".join(t.get_text() for t in figure.findobj(Text))
     assert f"0.02109\n± 0.00052 GJ/a\nextrapolated\n(mesh {plain.barriers.open:.5g})" in said
-    figure = figure_of_pass(replace(alone(), extrapolated=sure))
+    figure = replace(alone(), extrapolated=sure).plot()
     said = figure.axes[0].texts[0].get_text()
     assert "to open: 0.02109 ± 0.00052 GJ/a, extrapolated" in said
     assert "in clamped grips, by twisting: " in said
@@ -213,19 +207,19 @@ def test_pictures(tmp_path):
     """Each is drawn and saved; what cannot be drawn is refused in a sentence."""
     curves = barriers_over(der.circle(), [3.0, 4.0, 8.0], n_edges=32)
     figures = {
-        "landscape": figure_of_landscape(along(8.0)),
-        "without": figure_of_landscape(along(3.0)),
-        "barriers": figure_of_barriers(curves),
-        "surface": figure_of_surface(sheet()),
-        "pass": figure_of_pass(alone()),
+        "landscape": along(8.0).plot(),
+        "without": along(3.0).plot(),
+        "barriers": curves.plot(),
+        "surface": sheet().plot(),
+        "pass": alone().plot(),
     }
     for name, figure in figures.items():
-        save_figure(figure, tmp_path / f"{name}.png")
+        save(figure, tmp_path / f"{name}.png")
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000
     with pytest.raises(ValueError, match="plot must end in"):
-        save_figure(figures["pass"], tmp_path / "pass.txt")
+        save(figures["pass"], tmp_path / "pass.txt")
     with pytest.raises(ValueError, match="no well"):
-        figure_of_pass(alone(3.0))
+        alone(3.0).plot()
 
 
 # --- on disk and back ------------------------------------------------------------------------

@@ -19,8 +19,8 @@ from der.rod.free_ring import balance
 from der.rod.gripped_ring import free_supports, gripped_ring
 from der.rod.rod import discrete_rod
 from der.viz.plots.arrows import arc, bends, label_places
-from der.viz.plots.states import figure_of_states
-from der.viz.plots.style import save_figure
+from der.viz.plots.states import draw
+from der.viz.plots.style import save
 
 BAR = der.rectangular_section(2.0)
 
@@ -334,19 +334,19 @@ def test_a_file_that_is_no_record_is_named(tmp_path):
 
 def test_every_state_and_fall_is_drawn():
     """A name above each column, a node with the index, an arrow for each pair, with its energy."""
-    row, graph = figure_of_states(sample()).axes
+    row, graph = draw(sample()).axes
     assert [t.get_text() for t in row.texts][::2] == ["flat", "figure eight", "saddle 1"]
     assert [t.get_text() for t in graph.texts] == ["9.00", "0", "1", "?"]
     assert len(graph.patches) == 1
     with pytest.raises(ValueError, match="at least one"):
-        figure_of_states(sample(states=(), transitions=()))
+        draw(sample(states=(), transitions=()))
     with pytest.raises(ValueError, match="plot must end in"):
-        save_figure(figure_of_states(sample()), "states.txt")
+        save(draw(sample()), "states.txt")
 
 
 def test_the_legend_fits_whatever_there_is():
     """On a narrow page in several rows, nothing beyond the edges."""
-    figure = figure_of_states(sample())
+    figure = draw(sample())
     (legend,) = figure.legends
     box = legend.get_window_extent()
     assert box.x0 >= 0.0
@@ -356,9 +356,9 @@ def test_the_legend_fits_whatever_there_is():
 def test_the_axis_of_one_state_begins_at_a_ring_without_strain():
     """Else a single level would stand on an axis of no meaning."""
     single = replace(sample().states[1], energy=8.0)
-    graph = figure_of_states(sample(states=(single,), transitions=(), gamma=1.0)).axes[1]
+    graph = draw(sample(states=(single,), transitions=(), gamma=1.0)).axes[1]
     assert graph.get_ylim()[0] < 0.0 < 8.0 < graph.get_ylim()[1]
-    title = figure_of_states(sample(gamma=1.0)).texts[0].get_text()
+    title = draw(sample(gamma=1.0)).texts[0].get_text()
     assert title.endswith("= 1 rad")
 
 

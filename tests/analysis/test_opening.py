@@ -27,7 +27,7 @@ from der.records.text import summary
 from der.rod.relaxation import relax
 from der.rod.rod import State, discrete_rod, edges, strains
 from der.rod.supports import supported
-from der.viz.plots.opening import EVENTS, figure_of_push
+from der.viz.plots.opening import EVENTS, draw
 
 ALIKE = 1e-5  # GJ/a
 
@@ -404,7 +404,7 @@ def test_a_ring_that_is_no_well_is_not_pushed():
     assert "no well" in found.why
     assert "no well" in summary(found)
     with pytest.raises(ValueError, match="push must open the ring to be plotted"):
-        figure_of_push(found)
+        draw(found)
 
 
 @pytest.mark.parametrize("points", [2, 7, 6.0, True])
@@ -421,7 +421,7 @@ def test_words_and_picture():
     assert f"{found.best.held.work:.8g}" in said
     assert "slow force" in said
     assert "dead couple" in said
-    figure = figure_of_push(found)
+    figure = draw(found)
     rings, *_ = figure.axes
     assert len([t for t in rings.texts if "work" in t.get_text()]) == 4
 
@@ -429,7 +429,7 @@ def test_words_and_picture():
 def test_picture_shows_what_is_extrapolated_and_how_many_there_are():
     """Values without mesh in the caption; counts and marks of all events in the legend."""
     found = replace(searched(), extrapolated={"force": (0.021088, 5.2e-4)})
-    figure = figure_of_push(found)
+    figure = draw(found)
     captions = [t.get_text() for t in figure.axes[0].texts if "work" in t.get_text()]
     assert "work 0.02109 ± 0.00052 GJ/a\nextrapolated" in captions[0]
     legend = [t.get_text() for t in figure.legends[0].get_texts()]

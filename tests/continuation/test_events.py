@@ -109,7 +109,7 @@ def test_two_changes_of_an_index_within_one_step_are_found():
 
 
 def test_both_changes_are_on_the_path():
-    """The whole path has the fold, the two branch points and the other fold, told apart."""
+    """The path has the fold, the two branch points and the other fold, told apart."""
     found = der.fold(der.Scene(NEARLY, SECTION, self_crossings=False))
     kinds = [(p.kind, p.index_before, p.index_after) for p in found.points if p.kind != "limit"]
     assert kinds == [("fold", 0, 1), ("branch", 1, 2), ("branch", 2, 1), ("fold", 1, 0)]
@@ -290,7 +290,7 @@ def test_a_fold_is_told_from_a_branch_point(ring, h_over_t, name, kinds):
 
 
 class Leap:
-    """A step on which a value falls, but for a leap at s = 0.37 on a way of 1e-6."""
+    """A step on which a value falls, but for a leap at s = 0.37 within 1e-6."""
 
     def __init__(self, height: float) -> None:
         self.height = height

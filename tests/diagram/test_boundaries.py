@@ -11,21 +11,21 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from der.diagram.boundaries import Slice
-from der.diagram.boundaries import _Diagram as Diagram
 from der.diagram.cases import LABELS, Row, solve_case
-from der.diagram.conditions import KINDS, NotFound, asymptotic, fresh, numbers
-from der.diagram.corners import Line, Met, mark_corners
-from der.diagram.corners import _has as reaches
-from der.diagram.corners import _solved as solved
-from der.diagram.curve_pruning import beside
-from der.diagram.curve_tracing import At, States, corrected, trace
+from der.diagram.curves.boundaries import _Search as Search
+from der.diagram.curves.conditions import KINDS, NotFound, asymptotic, fresh, numbers
+from der.diagram.curves.corners import Line, Met, mark_corners
+from der.diagram.curves.corners import _has as reaches
+from der.diagram.curves.corners import _solved as solved
+from der.diagram.curves.infinite_slope import across, infinite_slope_near
+from der.diagram.curves.label_changes import seeds
+from der.diagram.curves.polylines import loose_ends as loose_lines
+from der.diagram.curves.polylines import meetings
+from der.diagram.curves.pruning import beside
+from der.diagram.curves.slices import Slice, SliceCases
+from der.diagram.curves.tracing import At, States, corrected, trace
 from der.diagram.distributed import follow, loose_ends, unexplained
 from der.diagram.families import family
-from der.diagram.infinite_slope import across, infinite_slope_near
-from der.diagram.label_changes import seeds
-from der.diagram.polylines import loose_ends as loose_lines
-from der.diagram.polylines import meetings
 from der.diagram.scan import Scan, scan
 from der.diagram.scanned_boundaries import Corner, Curve
 from der.diagram.store import Store
@@ -303,7 +303,7 @@ def test_a_curve_that_passes_beside_a_corner_does_not_end_there():
 
 def test_two_curves_of_a_kind_cross_in_a_corner(monkeypatch):
     """Cusps of unlike states, on two straight lines; one followed twice crosses nothing."""
-    monkeypatch.setattr("der.diagram.corners.on", lambda mesh, seed: seed)
+    monkeypatch.setattr("der.diagram.curves.corners.on", lambda mesh, seed: seed)
 
     def condition(kind):
         def value(u, seed):
@@ -372,14 +372,15 @@ def test_ends_are_looked_round():
         foldable = far < 0.3
         return Row(case, LABELS[2] if foldable else LABELS[0], foldable, False, "snap-back")
 
-    diagram = Diagram(Slice(of, "x", None, {}), lambda cases: [label(case) for case in cases])
-    found = diagram._around([np.array([0.8, 0.5])], [])
+    part = Slice(of, "x", None, {})
+    search = Search(SliceCases(part, lambda cases: [label(case) for case in cases]))
+    found = search._around([np.array([0.8, 0.5])], [])
     assert [crossing.kind for crossing in found] == ["foldability"] * 2
     for crossing in found:
         assert np.linalg.norm(crossing.middle - 0.5) == pytest.approx(0.3, abs=1e-3)
     turn = np.linspace(-0.1, 0.1, 21)
     arc = 0.5 + 0.3 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    assert diagram._around([np.array([0.8, 0.5])], [line_of("foldability", arc, None)]) == []
+    assert search._around([np.array([0.8, 0.5])], [line_of("foldability", arc, None)]) == []
 
 
 def test_a_curve_ends_where_labels_say_so(monkeypatch):
@@ -391,10 +392,11 @@ def test_a_curve_ends_where_labels_say_so(monkeypatch):
         foldable = y > 0.5 or x > 0.53
         return Row(case, LABELS[2] if foldable else LABELS[0], foldable, False, "snap-back")
 
-    diagram = Diagram(Slice(of, "x", None, {}), lambda cases: [label(case) for case in cases])
-    monkeypatch.setattr(diagram, "_condition", lambda kind: lambda u, s: (float(u[1] - 0.5), s))
+    part = Slice(of, "x", None, {})
+    search = Search(SliceCases(part, lambda cases: [label(case) for case in cases]))
+    monkeypatch.setattr(search, "_condition", lambda kind: lambda u, s: (float(u[1] - 0.5), s))
     line = line_of("foldability", [(0.1, 0.5), (0.4, 0.5), (0.9, 0.5), (0.95, 0.5)], None)
-    ((kept,), met) = diagram._kept([line])
+    ((kept,), met) = search._kept([line])
     assert met == []
     assert kept.places[0] == pytest.approx((0.1, 0.5))
     assert kept.places[-1][0] == pytest.approx(0.53, abs=2e-3)

@@ -10,22 +10,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import typer
 from here import Here
 
 import der
-from der.diagram.boundaries import Boundaries
+from der.cli.figures import PhaseOptions
+from der.cli.figures import phase as command
 from der.diagram.cases import LABELS, Row
-from der.diagram.diagram import phase_diagram, run_phase
+from der.diagram.curves.slices import Boundaries
+from der.diagram.diagram import phase_diagram
 from der.diagram.families import family
+from der.diagram.picture import picture
 from der.diagram.rod_check import rod_check, table
 from der.diagram.scan import scan
 from der.diagram.scanned_boundaries import BoundaryPoint, Curve, scanned_boundaries
 from der.diagram.store import Store
 from der.paper import draw
-from der.viz.plots.phase_diagram import NAMES, save_diagram
-from der.viz.plots.phase_diagram import _others as others
-from der.viz.plots.phase_diagram import _regions as regions
-from der.viz.plots.phase_diagram import _segments as pieces
+from der.viz.plots.phase_diagram import draw as draw_diagram
+from der.viz.plots.regions import pixels
+from der.viz.plots.style import save
 from validation.benchmark import phase as bench_phase
 from validation.stress import kill_and_resume as killed
 
@@ -65,7 +68,7 @@ def folder(tmp_path_factory):
 def diagram(folder, without_curves):
     """A small part of fig3a round the circle, with the rod asked about some of it."""
     options = {"ranges": CIRCLES, "finest": 4, "check": der.fold, "sample": 8}
-    return phase_diagram("fig3a", folder, workers=2, progress=False, **options)
+    return phase_diagram("fig3a", folder, workers=1, progress=False, **options)
 
 
 # --- The files -------------------------------------------------------------------------------
@@ -77,6 +80,13 @@ def test_files_are_written(diagram, folder):
     assert names == {"cases.csv", "boundaries.csv", "corners.csv", "check.csv", "fig3a.png"}
     assert {file.name for file in folder.iterdir()} == names | {"cases.jsonl"}
     assert (folder / "fig3a.png").read_bytes().startswith(FORMAT)
+
+
+def test_a_diagram_is_short_in_print_and_draws_itself(diagram, tmp_path):
+    """As records do."""
+    assert repr(diagram).startswith(f"PhaseDiagram(fig3a, {len(diagram.rows)} cases, ")
+    assert diagram.plot(tmp_path / "x.png").axes
+    assert (tmp_path / "x.png").read_bytes().startswith(FORMAT)
 
 
 def test_table_of_cases_holds_every_case_once(diagram, folder):
@@ -112,35 +122,36 @@ def test_folder_with_cases_is_refused_unless_resumed(diagram, folder):
     assert (folder / "cases.csv").read_bytes() == before
 
 
-def test_command_gets_its_words(diagram, folder):
+def options_of(folder, **more):
+    """Options of the command for the diagram of these tests."""
+    span = ["b_over_a=0.9:1", "h-over-t=1.25:2.25"]
+    return PhaseOptions("fig3a", str(folder), workers=1, resume=True, span=span, finest=4, **more)
+
+
+def test_command_says_what_it_did(diagram, folder, capsys):
     """Cases by label, boundaries and files."""
-    words = run_phase(
-        "fig3a",
-        folder,
-        workers=1,
-        resume=True,
-        ranges=["b_over_a=0.9:1", "h-over-t=1.25:2.25"],
-        finest=4,
-        quiet=True,
-    )
-    assert f"{len(diagram.rows)} cases, 0 solved now" in words
-    assert "unstable, snap-back" in words
-    assert str(folder / "fig3a.png") in words
+    assert command(options_of(folder)) == 0
+    text = capsys.readouterr().out
+    assert f"{len(diagram.rows)} cases, 0 solved now" in text
+    assert "unstable, snap-back" in text
+    assert str(folder / "fig3a.png") in text
 
 
-def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
+def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch, capsys):
     """Without boundaries, edges of the scan; with one that ends in the middle, that end."""
     half = [replace(curve, points=curve.points[:2]) for curve in diagram.curves]
-    told = []
     for curves in ([], half):
         monkeypatch.setattr("der.diagram.diagram.follow", lambda *_, c=curves: Boundaries(c, []))
-        options = {"ranges": ["b_over_a=0.9:1", "h-over-t=1.25:2.25"], "finest": 4, "quiet": True}
-        run_phase("fig3a", folder, workers=1, resume=True, warn=told.append, **options)
+        command(options_of(folder, quiet=True))
+    output = capsys.readouterr()
+    assert output.out == ""
+    told = [line.removeprefix("der: ") for line in output.err.splitlines()]
     monkeypatch.setattr(
         "der.diagram.diagram.phase_diagram", lambda *_, **__: replace(diagram, curves=half)
     )
-    draw(["fig3a"], folder, warn=told.append)
-    assert told[-2:] == told[-4:-2]
+    drawn = []
+    draw(["fig3a"], folder, warn=drawn.append)
+    assert drawn == told[-2:]
     assert re.fullmatch(r"fig3a: edges of the scan without a boundary .*: \d+", told[0])
     assert re.fullmatch(
         r"fig3a: ends of boundaries that lead nowhere: \d+, the first with b_over_a = .*", told[-1]
@@ -150,8 +161,7 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"ranges": ["b_over_a"]}, "ranges must be like b_over_a=0.7:1, got 'b_over_a'"),
-        ({"ranges": ["r_over_a=0.1:1"]}, "ranges of fig3a must be of b_over_a, h_over_t"),
+        ({"ranges": {"r_over_a": (0.1, 1.0)}}, "ranges of fig3a must be of b_over_a, h_over_t"),
         ({"sample": 0}, "sample must be a whole number from 1, got 0"),
         ({"workers": 0}, "workers must be a whole number from 1, got 0"),
         ({"workers": 2, "scheduler": "tcp://x:1"}, "workers cannot be given together with a"),
@@ -159,7 +169,13 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch):
 )
 def test_what_is_not_allowed_is_refused_by_name(tmp_path, options, message):
     with pytest.raises(ValueError, match=message):
-        run_phase("fig3a", tmp_path / "new", **options)
+        phase_diagram("fig3a", tmp_path / "new", **options)
+
+
+def test_range_needs_two_numbers(tmp_path):
+    """The message names the option and shows its form."""
+    with pytest.raises(typer.TyperException, match=r"must be like b_over_a=0\.7:1, got 'b_over_a'"):
+        command(PhaseOptions("fig3a", str(tmp_path / "new"), span=["b_over_a"]))
 
 
 def test_a_file_is_no_folder(tmp_path):
@@ -269,7 +285,8 @@ def test_colours_change_where_the_boundary_is(tmp_path):
     curves = [Curve("foldability", "x", tuple(points))]
     wrong = []
     for lines in (curves, []):
-        colours = regions(found, "x", None, pieces(of, "x", lines))
+        (plane,) = picture(found, lines).slices
+        colours = pixels(plane.sheets[0], plane.boundaries)
         at = (np.arange(len(colours)) + 0.5) / len(colours) - 0.5
         radius = np.hypot(*np.meshgrid(at, at, indexing="ij"))
         clear = np.abs(radius - 0.3) > 0.1 / 16
@@ -292,7 +309,8 @@ def test_cube_is_drawn_in_slices(tmp_path, name):
     for curve in curves:
         parts = [of.unit(point.case)[1] for point in curve.points]
         assert parts == pytest.approx([round(4 * parts[0]) / 4] * len(parts), abs=1e-9)
-    file = save_diagram(found, curves, tmp_path / f"{name}.png")
+    file = tmp_path / f"{name}.png"
+    save(draw_diagram(picture(found, curves)), file)
     assert file.read_bytes().startswith(FORMAT)
 
 
@@ -307,8 +325,9 @@ def test_failed_cases_have_a_colour_of_their_own(tmp_path):
         )
 
     found = scanned(family("fig5c", finest=16), tmp_path, fails)
-    save_diagram(found, [], tmp_path / "failed.png")
-    assert NAMES[-1] == "failed"
+    figure = draw_diagram(picture(found, []))
+    said = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "failed" in said
 
 
 def test_a_wedge_between_nodes_is_coloured(tmp_path):
@@ -330,7 +349,8 @@ def test_a_wedge_between_nodes_is_coloured(tmp_path):
     beside = [band(of.case("x", place)) for place in places]
     wrong = []
     for rows in (beside, []):
-        colours = regions(found, "x", None, pieces(of, "x", curves), others(of, "x", rows))
+        (plane,) = picture(found, curves, rows).slices
+        colours = pixels(plane.sheets[0], plane.boundaries)
         y = (np.arange(len(colours)) + 0.5) / len(colours) * 16
         expected = np.array([0, 2, 1])[(y > 8.4).astype(int) + (y > 8.6)]
         wrong.append(int((colours != expected).sum()))

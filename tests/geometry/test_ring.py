@@ -12,15 +12,8 @@ from numpy.testing import assert_allclose
 from scipy.special import ellipe
 
 from der.geometry.profile import CLOSED
-from der.geometry.ring import (
-    Ring,
-    circle,
-    ellipse,
-    profile,
-    rectangle,
-    ring_from_json,
-    triangle,
-)
+from der.geometry.ring import Ring
+from der.geometry.shapes import circle, ellipse, profile, rectangle, ring_from_json, triangle
 
 
 def inscribed(vertex_angle: float) -> float:
@@ -541,6 +534,6 @@ def test_bad_record_is_named(record, message):
 
 def test_statement_imports_neither_scipy_nor_numba():
     """The statement holds no kernels; scipy is loaded by the shape that needs it."""
-    code = "import sys, der.geometry.ring; print({'scipy', 'numba'} & set(sys.modules))"
+    code = "import sys, der.geometry.shapes; print({'scipy', 'numba'} & set(sys.modules))"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "set()"

@@ -168,7 +168,7 @@ def test_invert_a_block(m, kind):
 
 
 def test_three_by_formula_is_three_by_sweeps():
-    """Where `invert_three` takes a block: the same -A^-1 and count; where not, A is left alone."""
+    """Where `invert_three` takes a block: the same -A^-1 and count; where not, A stays as it is."""
     taken = 0
     for seed in range(40):
         A = np.random.default_rng(seed).normal(size=(3, 3))
@@ -453,7 +453,7 @@ def test_augmented_system_at_a_fold(n, m, refined, error):
 
 @pytest.mark.parametrize("refined", [False, True], ids=["plain", "refined"])
 def test_augmented_system_at_an_exact_fold(refined):
-    """K singular to the last digit, from whole numbers; small and tame: 1e-13."""
+    """K singular to the last digit, from integers; small and tame: 1e-13."""
     matrix = (
         np.array([[[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 2.0]], np.diag([-1.0, 3.0, 2.0])]),
         np.zeros((2, 3, 3)),

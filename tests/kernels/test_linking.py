@@ -256,7 +256,7 @@ def test_writhe_where_a_vertex_all_but_touches_an_edge(seed):
 def test_figure_eight(lift):
     """One crossing, right-handed where the strand along (1, 1) passes above the one along (-1, 1).
 
-    Lk = +1 there and -1 where it passes below: a passage of strands changes it by two.
+    Lk = +1 there and -1 where it passes below: a self-crossing changes it by two.
     """
     it = blackboard(lifted_eight(lift), 50)
     number, miss = link(it.quat, it.length)
@@ -314,7 +314,7 @@ def symmetric_ring(n: int, copies: int) -> Ribbon:
     return ribbon(x, np.tile([1.0, 0.0, 0.0], (n, 1)), angle)
 
 
-def piece(it: Ribbon, copies: int) -> tuple[np.ndarray, np.ndarray]:
+def sector_of(it: Ribbon, copies: int) -> tuple[np.ndarray, np.ndarray]:
     """Frames and lengths of a sector: a quarter runs from free point to grip, a half grip to grip.
 
     Its end edges are halves: the other half lies beyond the plane of symmetry.
@@ -341,15 +341,15 @@ def test_unfold_gives_the_frames_of_the_ring(n, symmetry, copies):
     These stand on differences of vertices, so a rounding is divided by the edge length: 1e-13.
     """
     it = symmetric_ring(n, symmetry)
-    frames = rotation(unfold(piece(it, copies)[0], copies))
+    frames = rotation(unfold(sector_of(it, copies)[0], copies))
     assert_allclose(frames, rotation(it.quat), rtol=0, atol=1e-13)
 
 
 @EVERY_SECTOR
 def test_unfold_lengths_gives_the_lengths_of_the_ring(n, symmetry, copies):
-    """Edges in a plane of symmetry are whole again; as above, relative: 1e-13."""
+    """Edges in a plane of symmetry are complete again; as above, relative: 1e-13."""
     it = symmetric_ring(n, symmetry)
-    lengths = unfold_lengths(piece(it, copies)[1], copies)
+    lengths = unfold_lengths(sector_of(it, copies)[1], copies)
     assert_allclose(lengths, it.length, rtol=1e-13, atol=0)
 
 
@@ -357,7 +357,7 @@ def test_unfold_lengths_gives_the_lengths_of_the_ring(n, symmetry, copies):
 def test_vertices_of_the_unfolded_sector(n, symmetry, copies):
     """The ring itself, its origin midway between the grips; roundings summed round the ring."""
     it = symmetric_ring(n, symmetry)
-    quat, length = piece(it, copies)
+    quat, length = sector_of(it, copies)
     x = vertices(unfold(quat, copies), unfold_lengths(length, copies))
     assert_allclose(x, it.x, rtol=0, atol=1e-13)
 
@@ -371,9 +371,9 @@ def test_writhe_of_a_symmetric_ring_from_its_sector(n, symmetry, copies):
 
 @EVERY_SECTOR
 def test_link_of_a_symmetric_ring_from_its_sector(n, symmetry, copies):
-    """Same integer from a quarter, a half and the whole; misses are rounding."""
+    """Same integer from a quarter, a half and the full ring; misses are rounding."""
     it = symmetric_ring(n, symmetry)
-    number, miss = link(*piece(it, copies), copies)
+    number, miss = link(*sector_of(it, copies), copies)
     assert number == round(it.tw + it.wr)
     assert miss < 1e-10
 
@@ -384,4 +384,4 @@ def test_flat_untwisted_ring_has_link_zero(copies):
     t, _ = places(16)
     x = np.column_stack([0.0 * t, np.sin(t), -np.cos(t)])
     it = ribbon(x, np.tile([1.0, 0.0, 0.0], (16, 1)))
-    assert link_number(*piece(it, copies), copies) == pytest.approx(0.0, abs=1e-13)
+    assert link_number(*sector_of(it, copies), copies) == pytest.approx(0.0, abs=1e-13)

@@ -382,7 +382,7 @@ def test_sharp_right_triangle_snaps_back_far():
 
 
 def test_obtuse_triangle_of_square_section_does_not_fold():
-    """120 degrees, r/a = 1/15, h/t = 1: un-foldable, with a complex path (figure 11a)."""
+    """120 degrees, r/a = 1/15, h/t = 1: not foldable, with a complex path (figure 11a)."""
     record = path(der.triangle(2 * math.pi / 3, 1 / 15), 1.0)
     assert not record.mode.foldable
     assert len(record.folds) == 2

@@ -193,7 +193,7 @@ def test_the_barrier_to_open_exists_above_the_threshold_only_and_grows():
     assert np.all(np.diff(curves.open[curves.h_over_t > 3.5]) > 0.0)
 
 
-# --- without grips ----------------------------------------------------------------------------
+# --- the free ring ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("ring", "h_over_t"), SHAPES, ids=str)
@@ -236,10 +236,10 @@ def test_the_saddle_of_a_circle_is_the_same_in_grips_and_without(h_over_t):
     assert found.open == pytest.approx(found.twisting.open, abs=1e-12)
 
 
-def test_an_ellipse_without_grips_opens_far_more_easily():
+def test_a_free_ellipse_opens_far_more_easily():
     """b/a = 0.6, h/t = 4: 0.0107 GJ/a beside 0.671 by twisting, of order 2 in the cell.
 
-    The saddle of twisting has two ways down; beside it is one of index 1, residual below 1e-9.
+    The saddle of twisting has index 2; beside it is one of index 1, residual below 1e-9.
     """
     ones = [without_grips(der.ellipse(0.6), 4.0, n) for n in (32, 64, 128)]
     for one in ones:
@@ -254,9 +254,9 @@ def test_an_ellipse_without_grips_opens_far_more_easily():
 
 
 def test_twisting_about_either_axis_leads_to_one_free_saddle():
-    """Ellipse b/a = 0.85: the free ring knows no axis. From two meshes, to their rounding.
+    """Ellipse b/a = 0.85: a free ring knows no axis. From two meshes, to their rounding.
 
-    The saddle of twisting is the same about either axis as well, with two ways down.
+    The saddle of twisting is the same about either axis as well, with index 2.
     """
     about_x, about_y = (without_grips(der.ellipse(0.85, axis), 4.0) for axis in "xy")
     assert about_x.open == pytest.approx(about_y.open, abs=1e-9)
@@ -278,7 +278,7 @@ def test_a_free_saddle_leads_to_flat_and_to_folded(h_over_t):
 
 
 def test_climbs_from_both_sides_meet_in_one_saddle():
-    """From the saddle of twisting along its other way down, and from the folded ring uphill.
+    """From the saddle of twisting along its other unstable mode, and from the folded ring uphill.
 
     Dynamic relaxation, which knows no Hessian, leads from there to flat and to folded.
     """
@@ -353,7 +353,7 @@ def test_a_stable_state_of_the_path_is_a_valley_of_the_surface():
 
 
 def test_the_index_says_where_the_symmetry_breaks():
-    """h/t = 1.6, far corner: a way down aside; a kick along it leads the full ring lower."""
+    """h/t = 1.6, far corner: a mode out of the surface is unstable; a kick along it leads lower."""
     one = sheet(der.circle(), 1.6, 24)
     assert np.all(one.index[:20] == 0)
     assert one.index.max() == 2

@@ -218,7 +218,7 @@ def test_twist_is_continuous_along_the_path():
 
 
 def first_contact(n_edges: int) -> tuple[float, int]:
-    """Return gamma and the magnitude of Lk behind the first passage of strands at h/t = 4."""
+    """Return gamma and the magnitude of Lk behind the first self-crossing at h/t = 4."""
     path = der.fold(circle(4.0, n_edges, stability=False))
     point = next(point for point in path.points if point.kind == "contact")
     assert point.details["linking_before"] == 0

@@ -35,7 +35,7 @@ def scene(ring, n=128, **more):
 
 @pytest.mark.parametrize("natural", [1.0, 0.0, -0.5, 3.2])
 def test_covered_circles(natural):
-    """U = pi alpha (n - kappa0)^2, exactly on any mesh; never a way down in the plane."""
+    """U = pi alpha (n - kappa0)^2, exactly on any mesh; never unstable in the plane."""
     found = der.planar(scene(der.circle(natural), 64, error_bars=False))
     covered = [state for state in found.states if state.turning]
     turns = sorted(state.turning for state in covered)
@@ -216,7 +216,7 @@ def test_a_path_that_is_lost_says_so():
     """Sixteen edges are taut at 7 pi/8, short of pi: what was found up to there stays."""
     found = der.squeeze(scene(der.circle(), 16, error_bars=False), math.pi - 1e-5)
     assert found.status == "not converged"
-    assert f"distance = {7.0 * math.pi / 8.0:.6f}" in found.message
+    assert "distance = 2.74889" in found.message
     assert len(found) > 3
     assert np.all(np.diff(found.distance) > 0.0)
     assert 7.0 * math.pi / 8.0 - 1e-6 < found.distance[-1] < 7.0 * math.pi / 8.0

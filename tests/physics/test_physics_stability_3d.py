@@ -93,7 +93,7 @@ def test_the_index_changes_by_one_at_a_fold(ring, h_over_t):
         assert abs(point.index_after - point.index_before) == by
 
 
-# --- folded rings, without grips ----------------------------------------------------------------
+# --- folded rings, released ---------------------------------------------------------------------
 
 
 def test_thresholds_of_the_free_three_covered_circle():
@@ -180,7 +180,7 @@ def test_slopes_about_both_axes_vanish_together(shape, b):
     assert at[0] == pytest.approx(at[1], rel=1e-6)
 
 
-def test_an_ellipse_that_the_slope_calls_stable_is_not_without_grips():
+def test_an_ellipse_that_the_slope_calls_stable_is_not_when_released():
     """b/a = 0.6: the slope is positive above h/t = 2.195, the free ring a minimum above 3.63 only.
 
     The order is 2. Under a moment the index follows the slope.
@@ -214,7 +214,7 @@ def test_the_unstable_mode_converges(ring, h_over_t, softest):
 
 @pytest.mark.parametrize(("ring", "h_over_t"), [(der.ellipse(0.6), 3.0), (OBTUSE, 4.0)], ids=str)
 @pytest.mark.parametrize("a_over_t", [50.0, 200.0])
-def test_stretch_keeps_the_unstable_mode(ring, h_over_t, a_over_t):
+def test_stretch_leaves_the_unstable_mode(ring, h_over_t, a_over_t):
     """With edges that stretch, one more unknown each and no constraint, the free index is 1, too.
 
     The state is solved for anew, free of grips.
@@ -231,7 +231,7 @@ def test_stretch_keeps_the_unstable_mode(ring, h_over_t, a_over_t):
 
 
 @pytest.mark.parametrize(("ring", "h_over_t"), [(der.ellipse(0.6), 3.0), (OBTUSE, 4.0)], ids=str)
-def test_a_free_ring_unfolds_to_flat(ring, h_over_t):
+def test_a_ring_left_alone_unfolds_to_flat(ring, h_over_t):
     """Kicked by 0.02 rad along either sign of the unstable mode it comes to rest flat, U = 0.
 
     Dynamic relaxation knows no Hessian. Above the free threshold a kick along the softest mode
@@ -348,7 +348,7 @@ def test_where_a_ring_goes_that_loses_its_symmetry(ring, h_over_t, folded_energy
 
 def planar_least(ring, section, n_edges):
     """The planar three-covered shape of least bending energy, as an equilibrium in the grips."""
-    from der.bvp.folded_shape import bent_by_force
+    from der.bvp.folded_half import bent_by_force
 
     gripped = gripped_ring(ring, section, n_edges)
     a = 0.5 * (bent_by_force(ring).angle(gripped.arc_length) - 0.5 * np.pi)
@@ -366,7 +366,7 @@ def test_the_folded_triangle_is_not_always_the_planar_one_of_least_energy(degree
     """r/a = 0.1, h/t = 4: the least shape is reached above 54.987 degrees, not from 49 up to there.
 
     Energies by Romberg's scheme from 64, 128, 256 edges, against the boundary-value problem and the
-    planar rod. Either shape is unstable: index 1 under a moment, 2 or 3 without grips.
+    planar rod. Either shape is unstable: index 1 under a moment, 2 or 3 when released.
     """
     ring, section = der.triangle(math.radians(degrees), 0.1), der.rectangular_section(4.0)
     energies, least_energies = [], []
@@ -386,11 +386,11 @@ def test_the_folded_triangle_is_not_always_the_planar_one_of_least_energy(degree
 
 
 def test_survey_of_an_ellipse(tmp_path):
-    """b/a = 0.6 about x, h/t = 1, 2, 3, 4: not folded, unstable, unstable without grips, stable."""
+    """b/a = 0.6 about x, h/t = 1, 2, 3, 4: not folded, unstable, unstable when released, stable."""
     from scenarios.stability_beyond_symmetry import survey, write
 
     verdicts = survey(quick=True)
-    names = ["not folded", "slope < 0", "slope > 0, unstable alone", "stable"]
+    names = ["not folded", "slope < 0", "slope > 0, unstable released", "stable"]
     assert [one.colour for one in verdicts] == names
     assert [one.wrong for one in verdicts] == ["", "", "c", ""]
     assert verdicts[2].slope == pytest.approx(0.5954817, abs=1e-6)

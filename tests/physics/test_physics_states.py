@@ -16,7 +16,7 @@ from der.analysis.multistability.transitions import descents
 from der.analysis.request import ring_of
 from der.rod.gripped_ring import free_supports, gripped_ring
 from scenarios import states_of_natural_curvature as over_curvature
-from scenarios.states_of_natural_curvature import ways_down
+from scenarios.states_of_natural_curvature import continuum_index
 
 
 @cache
@@ -61,13 +61,13 @@ def extrapolated(fine, coarse):
 def test_closed_form_has_the_known_thresholds_over_the_section(n, h_over_t, below, above):
     """kappa0 = 1, nu = 0.3: thresholds of the n-covered circle to their last digit."""
     bars = [der.rectangular_section(h_over_t + d) for d in (-1e-6, 1e-6)]
-    assert [ways_down(n, 1.0, bar.alpha, bar.beta) for bar in bars] == [below, above]
+    assert [continuum_index(n, 1.0, bar.alpha, bar.beta) for bar in bars] == [below, above]
 
 
 @pytest.mark.parametrize("kappa0", [2.666667, -1.777778])
 def test_closed_form_has_the_known_thresholds_of_the_flat_ring(kappa0):
     """alpha 0.9, beta 2.5: (1 + y)(beta + y) = 4 beta, y = alpha (kappa0 - 1); and the flip."""
-    inside, outside = (ways_down(1, kappa0 * (1.0 + d), 0.9, 2.5) for d in (-1e-6, 1e-6))
+    inside, outside = (continuum_index(1, kappa0 * (1.0 + d), 0.9, 2.5) for d in (-1e-6, 1e-6))
     assert inside == 0
     assert outside > 0
 
@@ -79,7 +79,7 @@ def test_indices_of_covered_circles_are_the_closed_form(n, h_over_t):
     bar = der.rectangular_section(h_over_t)
     seen = 0
     for kappa0 in np.arange(-2.0, 4.1, 0.5).tolist():
-        near = {ways_down(n, kappa0 + d, bar.alpha, bar.beta) for d in (-0.06, 0.0, 0.06)}
+        near = {continuum_index(n, kappa0 + d, bar.alpha, bar.beta) for d in (-0.06, 0.0, 0.06)}
         if len(near) > 1:
             continue
         one = known(covered(full(kappa0, bar), n))
@@ -150,7 +150,7 @@ def test_energy_of_the_figure_eight(kappa0):
 
 
 def test_the_tilted_ring_lies_between_flat_and_flipped():
-    """cos phi = -alpha kappa0/((beta - alpha) n): a state while it exists, and it falls to both."""
+    """cos phi = -alpha kappa0/((beta - alpha) n): a state while it exists; it relaxes to both."""
     bar = der.section(0.9, 2.5)
     kappa0 = 1.0
     ring = full(kappa0, bar)
@@ -175,7 +175,7 @@ def images_of(ring):
 
 
 def test_states_of_the_ring_at_h_over_t_2():
-    """Covers by their energies pi alpha (n - 1)^2 and indices; all at rest, all falls go down."""
+    """Covers by their energies pi alpha (n - 1)^2 and indices; all at rest; all descents lower the energy."""
     found, alpha = over_curvature.found, over_curvature.bar.alpha
     for name, n, index in (("flat", 1, 0), ("two-covered", 2, 0), ("three-covered", 3, 2)):
         assert found[name].energy == pytest.approx(math.pi * alpha * (n - 1) ** 2, abs=1e-10)

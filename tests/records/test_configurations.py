@@ -81,6 +81,18 @@ def test_falls_and_modes_come_back_bit_for_bit(tmp_path):
     assert_array_equal(after.softest.u, before.softest.u, strict=True)
 
 
+def test_shapes_that_are_too_large_are_not_unpacked(tmp_path, monkeypatch):
+    """A small file can unpack to more than the memory holds."""
+    monkeypatch.setattr("der.records.configurations.LARGEST", 1000)
+    shapes().save(tmp_path / "shapes.npz")
+    with pytest.raises(ValueError, match=r"shapes\.npz: .*1000 are allowed"):
+        Shapes.load(tmp_path / "shapes.npz")
+
+
+def test_shapes_are_short_in_print():
+    assert repr(shapes()) == "Shapes(4 states, 5 vertices, 0 snaps)"
+
+
 def test_nothing_more_comes_back_than_was_kept(tmp_path):
     shapes().save(tmp_path / "shapes.npz")
     after = Shapes.load(tmp_path / "shapes.npz")

@@ -213,7 +213,7 @@ def test_modes_of_the_classes_are_those_of_the_ring(shape, name, stretching):
     ],
 )
 def test_impossible_sectors_are_refused(ring: Ring, n_edges, name, message):
-    """ValueError at the door, with the argument, what is allowed and what was given."""
+    """A ValueError with the argument, what is allowed and what was given."""
     with pytest.raises(ValueError, match=message):
         gripped_ring(ring, SECTION, n_edges, name=name)
 

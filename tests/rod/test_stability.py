@@ -82,7 +82,7 @@ def load_rate(ring: GrippedRing, symmetry: str, at: Equilibrium, w: np.ndarray) 
 def test_index_is_zero_on_the_whole_path_at_h_over_t_4():
     """The index of the full ring is 0 from flat to folded: no fold, no branch, a stable ring.
 
-    A whole number, known at every state.
+    An integer, known at every state.
     """
     found = path(4.0, 64)
     assert not np.ma.getmaskarray(found.index).any()

@@ -290,6 +290,6 @@ def test_sweep_takes_more_edges_for_less_error():
     """A bar ten times under that of the first mesh is not met there."""
     ring, section = next(random_rings(1, 0))
     plain = sweep.swept(ring, section)
-    finer = sweep.swept(ring, section, 0.1 * plain.bar)
+    finer = sweep.swept(ring, section, 0.1 * plain.error)
     assert finer.n > plain.n
-    assert finer.bar <= 0.1 * plain.bar
+    assert finer.error <= 0.1 * plain.error

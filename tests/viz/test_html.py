@@ -15,10 +15,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import der
 from der.utils import files
-from der.viz import html as view_html
 from der.viz.html import check_html, page, save_html
+from der.viz.palette import STRETCHES
+from der.viz.resampling import in_step, resampled
 from der.viz.ribbon import ribbon, triangles
-from der.viz.tween import evenly, in_step
 
 EDGES, FRAMES = 16, 20
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
@@ -70,15 +70,15 @@ def view_html_code():
 
 def test_page_has_every_step_of_the_film(path, text):
     """Positions in float32, numbers bit for bit."""
-    film = evenly(path, FRAMES)
+    motion = resampled(path, FRAMES)
     (ring,) = data(text)["rings"]
-    positions, _ = ribbon(film.x, film.frames, film.section)
+    positions, _ = ribbon(motion.x, motion.frames, motion.section)
     assert_array_equal(unpacked(ring["positions"]), positions[:, ::2].astype("f4").ravel())
     for name in ("moment", "energy"):
-        assert_array_equal(unpacked(ring[name], "<f8"), getattr(film, name))
-    assert_array_equal(unpacked(ring["gamma"], "<f8"), film.gamma / np.pi)
-    assert len(ring["numbers"]) == len(ring["stability"]) == len(film.x)
-    assert ring["marks"] == sorted({film.step_of(point.position) for point in path.points})
+        assert_array_equal(unpacked(ring[name], "<f8"), getattr(motion, name))
+    assert_array_equal(unpacked(ring["gamma"], "<f8"), motion.gamma / np.pi)
+    assert len(ring["numbers"]) == len(ring["stability"]) == len(motion.x)
+    assert ring["marks"] == sorted({motion.step_of(point.position) for point in path.points})
 
 
 def test_curves_and_special_points_are_those_of_the_record(path, text):
@@ -87,21 +87,21 @@ def test_curves_and_special_points_are_those_of_the_record(path, text):
     assert_allclose(np.pi * np.array(marks["x"]), [point.gamma for point in path.points])
     assert_allclose(marks["y"], [point.moment for point in path.points])
     kinds = [t["name"] for t in traces if t.get("mode") == "lines" and t["type"] == "scatter"]
-    assert kinds == ["stable", "unstable", "stable"] * 2
+    assert kinds == [STRETCHES[key].label for key in (True, False, True)] * 2
     mesh = traces[0]
     assert_array_equal(np.column_stack([mesh[k] for k in "ijk"]), triangles(EDGES))
 
 
 def test_limits_hold_all_that_moves(path, other):
     text = page([path, other], frames=FRAMES)
-    layout, films = data(text)["figure"]["layout"], in_step([path, other], FRAMES)
+    layout, motions = data(text)["figure"]["layout"], in_step([path, other], FRAMES)
     for name, axis in (("gamma", "xaxis"), ("moment", "yaxis"), ("energy", "yaxis2")):
         low, high = layout[axis]["range"]
-        values = [getattr(film, name) / (np.pi if name == "gamma" else 1.0) for film in films]
+        values = [getattr(motion, name) / (np.pi if name == "gamma" else 1.0) for motion in motions]
         assert low < min(v.min() for v in values) < max(v.max() for v in values) < high
     reach = layout["scene"]["xaxis"]["range"][1]
     assert layout["scene2"]["zaxis"]["range"] == [-reach, reach]
-    assert max(np.abs(film.x).max() for film in films) < reach
+    assert max(np.abs(motion.x).max() for motion in motions) < reach
 
 
 # --- In a browser ----------------------------------------------------------------------------
@@ -180,20 +180,20 @@ def test_browser_finds_nothing_wrong(seen):
 @pytest.mark.parametrize("when", ["first", "moved", "next", "played"])
 def test_ring_and_dots_are_at_the_step_of_the_slider(path, seen, when):
     """The mesh in float32, each corner twice; dots on M and U."""
-    film, at = evenly(path, FRAMES), seen[when]
+    motion, at = resampled(path, FRAMES), seen[when]
     step = at["step"]
-    positions, _ = ribbon(film.x, film.frames, film.section)
+    positions, _ = ribbon(motion.x, motion.frames, motion.section)
     assert_array_equal(np.array(at["x"][0], dtype="f4"), positions[step, :, 0].astype("f4"))
-    for trace, values in ((-2, film.moment), (-1, film.energy)):
-        assert at["x"][trace] == [film.gamma[step] / np.pi]
+    for trace, values in ((-2, motion.moment), (-1, motion.energy)):
+        assert at["x"][trace] == [motion.gamma[step] / np.pi]
         assert at["y"][trace] == [values[step]]
-    assert f"{film.energy[step]:.3f}" in at["words"]
+    assert f"{motion.energy[step]:.3f}" in at["words"]
 
 
 def test_slider_and_buttons_move_to_where_they_say(path, seen):
     """Slider: step 7; next: the special point after it; play: onwards."""
-    film = evenly(path, FRAMES)
-    marks = sorted(film.step_of(point.position) for point in path.points)
+    motion = resampled(path, FRAMES)
+    marks = sorted(motion.step_of(point.position) for point in path.points)
     assert [seen[when]["step"] for when in ("first", "moved")] == [0, 7]
     assert seen["next"]["step"] == next(mark for mark in marks if mark > 7)
     assert seen["played"]["step"] > seen["next"]["step"] + 1
@@ -232,7 +232,7 @@ def test_full_disk_leaves_the_old_file_and_nothing_else(path, tmp_path, monkeypa
 
         files.write_whole(place, full)
 
-    monkeypatch.setattr(view_html, "write_whole", fill)
+    monkeypatch.setattr("der.viz.files.write_whole", fill)
     with pytest.raises(ValueError, match=r"some\.html' cannot be written: No space left"):
         save_html(path, file, frames=2)
     assert file.read_bytes() == b"before"

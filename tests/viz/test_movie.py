@@ -1,4 +1,4 @@
-"""Films: GIF without any program, MP4 by ffmpeg; whole or not at all, each picture at its state."""
+"""Movies: GIF without any program, MP4 by ffmpeg; atomic; each picture at its state."""
 
 import errno
 import shutil
@@ -11,9 +11,9 @@ from PIL import Image
 
 import der
 from der.utils import files
-from der.viz import movie as view_movie
-from der.viz.movie import DPI, PAIR, SIZE, save_movie
-from der.viz.tween import evenly
+from der.viz.movie import DPI, SIZE, MovieFigure, save_movie
+from der.viz.palette import PAIR
+from der.viz.resampling import resampled
 
 FRAMES = 6
 
@@ -33,11 +33,11 @@ def pictures(path, tmp_path_factory):
 
 
 def opened(file):
-    with Image.open(file) as film:
+    with Image.open(file) as motion:
         found = []
-        for k in range(film.n_frames):
-            film.seek(k)
-            found.append(np.asarray(film.convert("RGB")).astype(float))
+        for k in range(motion.n_frames):
+            motion.seek(k)
+            found.append(np.asarray(motion.convert("RGB")).astype(float))
     return np.array(found)
 
 
@@ -48,7 +48,7 @@ def apart(a, b):
 
 def test_there_is_a_picture_a_step_in_the_size_said(path, pictures):
     """Equal neighbours, as at both ends, are one picture that stays longer."""
-    n = len(evenly(path, FRAMES).x)
+    n = len(resampled(path, FRAMES).x)
     assert pictures.shape == (n, SIZE[1] * DPI, SIZE[0] * DPI, 3)
 
 
@@ -62,7 +62,7 @@ def test_ring_and_dots_move_and_axes_do_not(pictures):
 
 
 def test_dot_is_where_the_state_is(path):
-    """In the units of the axes, at every step; none of M while the ring falls."""
+    """In the units of the axes, at every step; none of M within snaps."""
     scene = der.Scene(
         der.circle(),
         der.rectangular_section(1.6),
@@ -72,23 +72,23 @@ def test_dot_is_where_the_state_is(path):
         control="angle",
     )
     path = der.fold(scene)
-    film = evenly(path, 40)
-    stage = view_movie._Stage([path], [film], 15)
-    (ring,) = stage.rings
-    for step in range(len(film.x)):
+    motion = resampled(path, 40)
+    figure = MovieFigure([path], [motion], 15)
+    (ring,) = figure.rings
+    for step in range(len(motion.x)):
         list(ring.show(step))
-        for dot, value in zip(ring.dots, (film.moment[step], film.energy[step]), strict=True):
+        for dot, value in zip(ring.dots, (motion.moment[step], motion.energy[step]), strict=True):
             (x,), (y,) = dot.get_data()
-            assert x == pytest.approx(film.gamma[step] / np.pi)
+            assert x == pytest.approx(motion.gamma[step] / np.pi)
             np.testing.assert_equal(y, value)
-    assert np.isnan(film.moment).any()
+    assert np.isnan(motion.moment).any()
 
 
-def test_whole_ring_is_in_sight_at_all_times(path):
-    film = evenly(path, 30)
-    stage = view_movie._Stage([path], [film], 15)
-    (ring,) = stage.rings
-    for step in range(len(film.x)):
+def test_all_of_the_ring_is_in_sight_at_all_times(path):
+    motion = resampled(path, 30)
+    figure = MovieFigure([path], [motion], 15)
+    (ring,) = figure.rings
+    for step in range(len(motion.x)):
         list(ring.show(step))
         places = np.concatenate([p.vertices for p in ring.ribbon.get_paths()])
         row = ring.ribbon.axes
@@ -96,7 +96,7 @@ def test_whole_ring_is_in_sight_at_all_times(path):
             assert limits[0] <= places[:, k].min() <= places[:, k].max() <= limits[1]
 
 
-def test_two_rings_are_in_one_film_and_in_one_scale(path, tmp_path):
+def test_two_rings_are_in_one_movie_and_in_one_scale(path, tmp_path):
     """Both colours of dots are there."""
     scene = der.Scene(der.ellipse(0.6), der.rectangular_section(4), n_edges=32, shapes=True)
     other = der.fold(scene)
@@ -105,26 +105,26 @@ def test_two_rings_are_in_one_film_and_in_one_scale(path, tmp_path):
     for colour in PAIR:
         rgb = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
         assert np.count_nonzero(np.abs(last - rgb).max(axis=-1) < 24) > 100
-    stage = view_movie._Stage([path, other], [evenly(path, 5), evenly(other, 5)], 2)
-    one, two = (ring.ribbon.axes for ring in stage.rings)
+    figure = MovieFigure([path, other], [resampled(path, 5), resampled(other, 5)], 2)
+    one, two = (ring.ribbon.axes for ring in figure.rings)
     assert (one.get_xlim(), one.get_ylim()) == (two.get_xlim(), two.get_ylim())
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed here")
-def test_mp4_is_a_film_that_ffmpeg_reads(path, tmp_path):
-    """As many pictures as steps and rests."""
+def test_mp4_is_a_movie_that_ffmpeg_reads(path, tmp_path):
+    """As many pictures as steps, and those that stay at both ends."""
     save_movie(path, tmp_path / "some.mp4", frames=FRAMES, fps=5)
     command = ["ffmpeg", "-v", "error", "-i", tmp_path / "some.mp4", "-f", "rawvideo", "-"]
     command[-1:] = ["-pix_fmt", "gray", "-"]
     raw = subprocess.run(command, capture_output=True, check=True).stdout
-    n = len(evenly(path, FRAMES).x) + 2 * 4  # 0.8 s at both ends
+    n = len(resampled(path, FRAMES).x) + 2 * 4  # 0.8 s at both ends
     assert len(raw) == n * SIZE[0] * DPI * SIZE[1] * DPI
 
 
 # --- What is refused -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["film.mov", "film", "gif"])
+@pytest.mark.parametrize("name", ["movie.mov", "movie", "gif"])
 def test_other_suffix_is_refused(path, tmp_path, name):
     with pytest.raises(ValueError, match=rf"movie must end in .gif, .mp4, got '.*{name}'"):
         save_movie(path, tmp_path / name)
@@ -139,7 +139,7 @@ def test_missing_ffmpeg_is_named_with_what_needs_none(path, tmp_path, monkeypatc
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed here")
 def test_what_ffmpeg_refuses_is_said_in_one_line(path, tmp_path, monkeypatch):
     """Such as a codec that it was built without."""
-    monkeypatch.setattr(view_movie, "CODEC", "of no such name")
+    monkeypatch.setattr("der.viz.movie.CODEC", "of no such name")
     with pytest.raises(ValueError, match=r"movie '.*a\.mp4' cannot be written: ffmpeg") as refused:
         save_movie(path, tmp_path / "a.mp4", frames=2, fps=1)
     assert "\n" not in str(refused.value)
@@ -168,7 +168,7 @@ def test_full_disk_leaves_the_old_file_and_nothing_else(path, tmp_path, monkeypa
 
         files.write_whole(place, full)
 
-    monkeypatch.setattr(view_movie, "write_whole", fill)
+    monkeypatch.setattr("der.viz.files.write_whole", fill)
     with pytest.raises(ValueError, match=r"some\.gif' cannot be written: No space left on device"):
         save_movie(path, file, frames=2, fps=1)
     assert file.read_bytes() == b"before"

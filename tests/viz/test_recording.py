@@ -17,8 +17,7 @@ from der.analysis.landscape.surface import energy_surface
 from der.records.configurations import Fall, Shapes, Softest
 from der.records.path import Timing, counts
 from der.utils import files
-from der.viz.animation import playback
-from der.viz.rerun import recording as view_rerun
+from der.viz.animation import animate
 from der.viz.rerun.recording import recording_bytes, save_landscape, save_recording
 
 EDGES = 32
@@ -172,7 +171,7 @@ def test_section_is_a_rectangle_to_scale_about_its_vertex(path, read):
     assert_allclose(corners.mean(axis=0), path.shapes.x[0, 0], atol=1e-6)
     assert_array_equal(corners[::2], corners[1::2])
     sides = np.linalg.norm(np.diff(corners[::2], axis=0), axis=1)
-    factor = playback(path).section.factor
+    factor = animate(path).section.factor
     assert_allclose(sides, factor * np.array([h, t, h]), rtol=1e-4)
     assert corners[0, 0] - corners[2, 0] == pytest.approx(factor * h, rel=1e-4)  # d1 = E1
     assert f"{factor:g} times as large" in read.rows("/about", "TextDocument:text")[None][0]
@@ -180,14 +179,14 @@ def test_section_is_a_rectangle_to_scale_about_its_vertex(path, read):
 
 def test_section_that_can_be_seen_is_drawn_as_it_is(path):
     thick = replace(path, numerics={**path.numerics, "a_over_t": 5.0})
-    assert playback(thick).section.factor == 1.0
-    assert playback(thick).section.t == pytest.approx(0.2)
+    assert animate(thick).section.factor == 1.0
+    assert animate(thick).section.t == pytest.approx(0.2)
 
 
 def test_section_without_shape_has_that_of_its_stiffnesses(path):
     """beta/alpha = (h/t)^2 (paper, Eq. A.16)."""
     bare = replace(path, section={**path.section, "h_over_t": None, "nu": None})
-    drawn = playback(bare).section
+    drawn = animate(bare).section
     assert drawn.h / drawn.t == pytest.approx(1.6)
 
 
@@ -208,28 +207,28 @@ def test_triangles_turn_outwards_and_close_the_surface(path, read):
     assert triangles.shape == (8 * EDGES, 3)
     a, b, c = positions[triangles].swapaxes(0, 1)
     volume = np.sum(a * np.cross(b, c)) / 6
-    drawn = playback(path).section
+    drawn = animate(path).section
     assert volume == pytest.approx(drawn.h * drawn.t * 2 * np.pi, rel=0.01)
 
 
 def test_energy_densities_add_up_to_the_energy(path):
     """Sum over the cells of both = U of the record, to rounding (logarithmic curvature)."""
-    film = playback(path)
+    motion = animate(path)
     cell = 2 * np.pi / EDGES
-    assert_allclose(cell * film.density.sum(axis=(0, 2)), path.energy, atol=1e-10)
+    assert_allclose(cell * motion.density.sum(axis=(0, 2)), path.energy, atol=1e-10)
 
 
 def test_folded_ring_is_bent_and_not_twisted(path):
     """At pi, curvature 3 against natural 1: density alpha (3 - 1)^2 / 2 all round."""
-    bending, twisting = playback(path).density[:, -1]
+    bending, twisting = animate(path).density[:, -1]
     assert_allclose(bending, 2 * path.section["alpha"], rtol=1e-6)
     assert_allclose(twisting, 0, atol=1e-8)
 
 
 def test_colours_rise_with_the_density(path, read):
     """Darkest where there is none, brightest at the largest, eight alike in each section."""
-    film = playback(path)
-    for name, density in zip(("bending", "twisting"), film.density, strict=True):
+    motion = animate(path)
+    for name, density in zip(("bending", "twisting"), motion.density, strict=True):
         rows = read.rows("/ring/ribbon", f"{name}:colors")
         assert set(rows[0]) == {0x440154FF}  # the flat ring is free of stress
         at = int(np.argmax(density.max(axis=1)))
@@ -312,13 +311,13 @@ def test_fall_is_put_in_after_its_state(path, tmp_path):
     """M is not known while the ring falls; all states keep their order."""
     path = falling(path)
     (fall,) = path.shapes.falls
-    film = playback(path)
+    motion = animate(path)
     new = slice(fall.after + 1, fall.after + 6)
-    assert len(film.x) == len(path) + 5
-    assert_array_equal(film.x[new], fall.x)
-    assert_array_equal(film.gamma[new], fall.gamma)
-    assert_array_equal(film.energy[new], fall.energy)
-    assert_array_equal(film.position[film.position >= 0], np.arange(len(path)))
+    assert len(motion.x) == len(path) + 5
+    assert_array_equal(motion.x[new], fall.x)
+    assert_array_equal(motion.gamma[new], fall.gamma)
+    assert_array_equal(motion.energy[new], fall.energy)
+    assert_array_equal(motion.position[motion.position >= 0], np.arange(len(path)))
 
     read = written(tmp_path, path)
     _, moments = read.series("moment")  # a nan breaks the line
@@ -379,7 +378,7 @@ def test_a_snap_is_a_dotted_drop_and_no_part_of_the_curve(tmp_path):
 
 def test_rest_takes_the_place_of_the_flat_ring(path):
     """Natural strains of no bar: the flat circle then bears alpha/2 all round."""
-    bending, _ = playback(path, rest=np.zeros((EDGES, 3))).density[:, 0]
+    bending, _ = animate(path, rest=np.zeros((EDGES, 3))).density[:, 0]
     assert_allclose(bending, 0.5 * path.section["alpha"], rtol=1e-9)
 
 
@@ -411,15 +410,15 @@ def test_path_without_shapes_is_refused(path):
 
 def test_path_that_does_not_begin_flat_needs_its_natural_strains(path):
     with pytest.raises(ValueError, match="rest must be given where gamma begins at"):
-        playback(cut(path, slice(3, None)))
+        animate(cut(path, slice(3, None)))
 
 
 def test_rest_of_another_ring_is_refused(path):
     with pytest.raises(ValueError, match=r"rest must have shape \(32, 3\), got \(2, 3\)"):
-        playback(path, rest=np.zeros((2, 3)))
+        animate(path, rest=np.zeros((2, 3)))
 
 
-@pytest.mark.parametrize("name", ["film.mp4", "film", "rrd"])
+@pytest.mark.parametrize("name", ["motion.mp4", "motion", "rrd"])
 def test_other_suffix_is_refused_before_any_work(path, tmp_path, name):
     with pytest.raises(ValueError, match=rf"rrd must end in .rrd, got '.*{name}'"):
         save_recording(path, tmp_path / name)
@@ -442,7 +441,7 @@ def test_full_disk_leaves_the_old_file_and_nothing_else(path, tmp_path, monkeypa
 
         files.write_whole(place, full)
 
-    monkeypatch.setattr(view_rerun, "write_whole", fill)
+    monkeypatch.setattr("der.viz.files.write_whole", fill)
     with pytest.raises(ValueError, match=r"some\.rrd' cannot be written: No space left on device"):
         save_recording(path, file)
     assert file.read_bytes() == b"before"

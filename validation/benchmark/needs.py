@@ -77,7 +77,7 @@ def _added(seconds: float, memory: int) -> str:
 
 def _outputs(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
     """What showing and storing a path costs, over folding it: files are left out, disks differ."""
-    from der.viz.plots.path import figure_of_path
+    from der.viz.plots.path import draw
     from der.viz.rerun.recording import recording_bytes
 
     path = der.fold(circle(4.0, n_edges=n_edges, **BARE))
@@ -85,7 +85,7 @@ def _outputs(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
     works: Mapping[str, Callable[[], object]] = {
         "record as JSON": path.to_json,
         "recording for playback": lambda: recording_bytes(shaped),
-        "plot": lambda: figure_of_path(path).canvas.draw(),
+        "plot": lambda: draw(path).canvas.draw(),
     }
     for name, work in works.items():
         done = measured(work, min(repeats, 5))

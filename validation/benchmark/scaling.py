@@ -69,8 +69,8 @@ def scale(n: int, repeats: int) -> Scale:
 def _newton(n: int, repeats: int) -> tuple[float, float, GrippedRing]:
     """CPU time of one iteration of the full ring, the residual it ends with, and the ring.
 
-    Timed as whole solves at a given gamma; the last pass of a solve, for tangent and index, costs
-    an iteration, and so does its share of the call.
+    Complete solves at a given gamma are timed; the last pass, for tangent and index, costs
+    as much as an iteration, and so does the call itself.
     """
     ring = gripped_ring(der.circle(), der.rectangular_section(4.0), n, name="full")
     flat = ring.correct(ring.start)

@@ -43,9 +43,9 @@ class Swept:
     """One ring of a sweep."""
 
     n: int  # edges that were enough, or the most that were tried; intervals of collocation
-    bar: float | None  # largest error estimated for M, over the largest |M|; None: not known
+    error: float | None  # largest error estimated for M, over the largest |M|; None: not known
     seconds: float  # CPU
-    reason: str  # why there is no path, or no bar; empty: there is
+    reason: str  # why there is no path, or no error estimate; empty: there is
 
 
 Method = Callable[[der.Ring, der.Section], Swept]
@@ -60,16 +60,16 @@ def swept(ring: der.Ring, section: der.Section, asked: float = ASKED) -> Swept:
     """Fold a ring on as many edges as its error bars ask for."""
     start = time.process_time()
     n = _divisible(ring, JOINTED if ring.breaks else SMOOTH)
-    bar, reason = _barred(ring, section, n)
-    while (bar is None or bar > asked) and n < MOST:
-        n = min(_finer(ring, n, bar, asked), MOST)
-        bar, reason = _barred(ring, section, n)
-    return Swept(n, bar, time.process_time() - start, reason)
+    error, reason = _estimated(ring, section, n)
+    while (error is None or error > asked) and n < MOST:
+        n = min(_finer(ring, n, error, asked), MOST)
+        error, reason = _estimated(ring, section, n)
+    return Swept(n, error, time.process_time() - start, reason)
 
 
-def _finer(ring: der.Ring, n: int, bar: float | None, asked: float) -> int:
-    """Edges with which a bar that was missed on ``n``, or not known there, is met."""
-    more = DOUBLED if bar is None else min(max((bar / asked) ** 0.25, LEAST), DOUBLED)
+def _finer(ring: der.Ring, n: int, error: float | None, asked: float) -> int:
+    """Edges that should be enough, after an error too large on ``n``, or not known there."""
+    more = DOUBLED if error is None else min(max((error / asked) ** 0.25, LEAST), DOUBLED)
     return _divisible(ring, more * n)
 
 
@@ -97,28 +97,28 @@ def solved(ring: der.Ring, section: der.Section, asked: float = ASKED) -> Swept:
 METHODS: dict[str, Method] = {"rod": swept, "boundary value": solved}
 
 
-def _barred(ring: der.Ring, section: der.Section, n: int) -> tuple[float | None, str]:
-    """The largest bar on ``n`` edges, or None and why."""
+def _estimated(ring: der.Ring, section: der.Section, n: int) -> tuple[float | None, str]:
+    """The largest error on ``n`` edges, or None and why."""
     try:
-        bar = largest_bar(der.fold(scene(ring, section, n)))
+        error = largest_error_bar(der.fold(scene(ring, section, n)))
     except der.NotConverged as failure:
         return None, failure.path.reason
-    return bar, "" if bar is not None else "a coarser mesh has no such states"
+    return error, "" if error is not None else "a coarser mesh has no such states"
 
 
-def largest_bar(path: der.Path) -> float | None:
+def largest_error_bar(path: der.Path) -> float | None:
     """Largest error bar of M, across the curve, over the largest |M|; None where one is missing.
 
     Notes
     -----
-    A state's error in gamma shows as one in M where the curve is steep: bars are taken as the
+    A state's error in gamma shows as one in M where the curve is steep: error bars are taken as the
     normal distance that they allow for, in (gamma/pi, M/max|M|), as all errors of the bench are.
     """
-    bars: dict[str, Any] = dict(path.error or {})
+    errors: dict[str, Any] = dict(path.error or {})
     special = {point.position for point in path.points if point.kind in ("branch", "contact")}
     kept = [k for k in range(len(path)) if k not in special]
-    columns = [[bars[name][k] for k in kept] for name in ("gamma", "moment")]
-    if any(bar is None for column in columns for bar in column):
+    columns = [[errors[name][k] for k in kept] for name in ("gamma", "moment")]
+    if any(error is None for column in columns for error in column):
         return None
     gamma, moment = (np.array(column, dtype=float) for column in columns)
     return float(np.hypot(gamma / np.pi, moment / np.abs(path.moment).max()).max())
@@ -167,19 +167,19 @@ def _reached(method: str, found: list[Swept]) -> Iterator[Row]:
     counts = sorted(Counter(one.n for one in found).items())
     note = ", ".join(f"{times} on {n} edges" for n, times in counts) if method == "rod" else ""
     yield Row("sweep", f"{method}, median CPU time a ring", each, "ms", note=note)
-    bars = [one.bar for one in found if one.bar is not None]
-    reasons = Counter(one.reason for one in found if one.bar is None)
+    errors = [one.error for one in found if one.error is not None]
+    reasons = Counter(one.reason for one in found if one.error is None)
     note = "; ".join(f"{times}: {reason}" for reason, times in reasons.items())
-    within = sum(bar <= ASKED for bar in bars)
+    within = sum(error <= ASKED for error in errors)
     yield Row("sweep", f"{method}, rings with M to {ASKED:g}", within, "", note=note)
-    yield from _quantiles(f"{method}, error of M as estimated", bars)
+    yield from _quantiles(f"{method}, error of M as estimated", errors)
 
 
 def _true(rings: list[Drawn], found: list[Swept], sample: int) -> list[float]:
     """Largest normal distance in M from the boundary-value problem, of the first of the rings."""
     errors = []
     for (ring, section), one in islice(zip(rings, found, strict=True), sample):
-        if one.bar is None:
+        if one.error is None:
             continue
         asked = scene(ring, section, one.n)
         errors.append(der.compare(asked, der.fold(asked)).largest[0])

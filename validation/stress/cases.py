@@ -23,7 +23,7 @@ from der import (
     rectangular_section,
     section,
 )
-from der.geometry.ring import ring_from_json, triangle_in_degrees
+from der.geometry.shapes import ring_from_json, triangle_in_degrees
 from der.scene import MEASURES
 from der.utils.checks import Array
 

@@ -105,7 +105,7 @@ def _points(path: Path) -> Iterator[Fault]:
 
 def _monotonic(path: Path, tolerance: float) -> Iterator[Fault]:
     """Gamma turns at folds and nowhere else; M at limits, and with gamma's sense at folds."""
-    contacts = {point.position for point in path.contacts}
+    crossings = {point.position for point in path.contacts}
     cuts = _cuts(path, path.folds)
     same = max(SAME, tolerance)  # residuals leave gamma as uncertain as they are large
     for low, high in pairwise(cuts):
@@ -113,8 +113,11 @@ def _monotonic(path: Path, tolerance: float) -> Iterator[Fault]:
         if not rise.size or min(rise.max(), -rise.min()) <= same:
             continue
         back = low + np.flatnonzero(rise * np.sign(rise.sum()) < 0.0)
-        if all({k, k + 1} & contacts for k in back.tolist()):
-            yield "out of order", f"a contact stands in the wrong place at {path.gamma[back[0]]}"
+        if all({k, k + 1} & crossings for k in back.tolist()):
+            yield (
+                "out of order",
+                f"a self-crossing stands in the wrong place at {path.gamma[back[0]]}",
+            )
             return
         yield "missed fold", f"gamma turns between {path.gamma[low]} and {path.gamma[high]}"
     rounding = max(MONOTONIC * float(np.abs(path.moment).max()), 100.0 * tolerance)

@@ -1,12 +1,13 @@
-"""Phase diagrams killed in mid-run and resumed, against the same one left alone.
+"""Phase diagrams whose runs are killed and resumed, against the same diagram drawn in one run.
 
     python -m validation.stress.kill_and_resume [--times N] [--diagram NAME] [--finest N]
-        [--workers N] [--seed N]
+        [--workers N] [--seed N] [--out DIR]
 
-runs ``der phase`` to its end; then the same in another folder, its processes killed (SIGKILL, the
-whole group) at random times, resumed each time, and at last left to finish. It says whether the
-tables are the same to the last byte, and how many cases were solved more than once: of every case
-that a worker begins a note is taken, so that what was in flight at a kill is known, not estimated.
+runs ``der phase`` to its end. Then it draws the same diagram in another folder: its processes are
+killed (SIGKILL, the complete group) at random times, resumed each time, and the last run finishes.
+It says whether the tables are the same to the last byte, and how many cases were solved more than
+once. Every worker notes each case that it begins, so that the number of cases in flight at a kill
+is known, not estimated.
 """
 
 from __future__ import annotations
@@ -20,14 +21,16 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path as File
 
 from der.diagram.cases import Case, Row, solve_case
-from der.diagram.diagram import STORE, run_phase
+from der.diagram.diagram import STORE, phase_diagram
 from der.diagram.store import Store
 from validation.arguments import Arguments
 
+MODULE = "validation.stress.kill_and_resume"
 NOTES = "RING_ORIGAMI_NOTES"  # environment: the file that workers write to
 TABLES = ("cases.csv", "boundaries.csv", "corners.csv")
 EARLY = 0.2  # of the kills: while the run is starting
@@ -48,7 +51,7 @@ class Killed:
     begun : how often one was begun
     in_flight : begun by the run that was killed and not yet in the store, at each kill
     stored : lines of the store
-    same : which tables are the same as those of the run that was left alone, by name
+    same : which tables are the same as those of the run that was not killed, by name
     """
 
     kills: int
@@ -71,15 +74,15 @@ class Killed:
 
     def __str__(self) -> str:
         flight = f"{min(self.in_flight, default=0)} to {max(self.in_flight, default=0)}"
-        lines = [
-            f"{self.kills} kills; in flight at one: {flight}, {sum(self.in_flight)} in all",
+        same = "".join(
+            f"{name}: {'the same' if ok else 'DIFFERENT'}\n" for name, ok in self.same.items()
+        )
+        return (
+            f"{self.kills} kills; in flight at one: {flight}, {sum(self.in_flight)} in all\n"
             f"{self.cases} cases, of which {self.again} were begun more than once; "
-            f"{self.stored} lines in the store",
-        ]
-        lines += [
-            f"{name}: {'the same' if same else 'DIFFERENT'}" for name, same in self.same.items()
-        ]
-        return "\n".join([*lines, "as if nothing had been" if self.ok else "NOT as it should be"])
+            f"{self.stored} lines in the store\n{same}"
+            f"{'as if there had been no kill' if self.ok else 'NOT as it should be'}"
+        )
 
 
 # --- Notes -----------------------------------------------------------------------------------
@@ -87,17 +90,13 @@ class Killed:
 
 def noted(case: Case) -> Row:
     """`solve_case`, of which a note is taken as it begins."""
-    note(case)
-    return solve_case(case)
-
-
-def note(case: Case) -> None:
-    """One line in the notes: a write to the end of a file is whole, whoever else writes."""
+    # one write to the end of a file is complete, whoever else writes
     file = os.open(os.environ[NOTES], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
     try:
         os.write(file, f"{case.key}\n".encode())
     finally:
         os.close(file)
+    return solve_case(case)
 
 
 def notes(file: File) -> Counter[str]:
@@ -107,11 +106,12 @@ def notes(file: File) -> Counter[str]:
 
 def calm(file: File) -> bool:
     """Whether workers that have lost their parent stop taking notes."""
+    sizes = [-1]
     for _ in range(PATIENCE):
-        before = file.stat().st_size if file.exists() else 0
-        time.sleep(CALM)
-        if (file.stat().st_size if file.exists() else 0) == before:
+        sizes.append(file.stat().st_size if file.exists() else 0)
+        if sizes[-1] == sizes[-2]:
             return True
+        time.sleep(CALM)
     return False
 
 
@@ -132,9 +132,9 @@ def kill(process: Process, *, workers_too: bool = True) -> bool:
     return there
 
 
-def lost(store: File, told: File, before: Counter[str]) -> int:
+def lost(store: File, notes_file: File, before: Counter[str]) -> int:
     """How many cases were begun since ``before``, and are not in the store."""
-    begun = notes(told) - before
+    begun = notes(notes_file) - before
     if not store.exists():
         return begun.total()
     with Store(store) as safe:
@@ -145,7 +145,7 @@ def kill_and_resume(
     start: Callable[[], Process],
     moments: Sequence[Callable[[Process], object]],
     store: File,
-    told: File,
+    notes_file: File,
 ) -> tuple[int, ...]:
     """Start runs and kill each at its moment, then let one finish; what was in flight at kills.
 
@@ -153,7 +153,7 @@ def kill_and_resume(
     ----------
     start : of a run that resumes, in a session of its own
     moments : each returns when its run is to be killed, or has ended
-    store, told : the run's store and the notes of its workers
+    store, notes_file : the run's store and the notes of its workers
 
     Raises
     ------
@@ -162,11 +162,11 @@ def kill_and_resume(
     """
     flight = []
     for moment in moments:
-        before = notes(told)
+        before = notes(notes_file)
         process = start()
         moment(process)
         if kill(process):
-            flight.append(lost(store, told, before))
+            flight.append(lost(store, notes_file, before))
     process = start()
     _, words = process.communicate()
     if process.returncode:
@@ -185,78 +185,76 @@ class Wanted:
     finest: int
     workers: int
 
-    def start(self, folder: File, told: File) -> Process:
+    def start(self, folder: File, notes_file: File) -> Process:
         """Draw it in a folder, going on with what is there, with notes taken."""
-        code = (
-            f"from validation.stress.kill_and_resume import draw; draw({self!r}, {str(folder)!r})"
-        )
         return subprocess.Popen(
-            [sys.executable, "-c", f"from validation.stress.kill_and_resume import Wanted; {code}"],
-            env={**os.environ, NOTES: str(told)},
+            [
+                sys.executable,
+                "-c",
+                f"from {__spec__.name} import *; {self!r}.draw({str(folder)!r})",
+            ],
+            env={**os.environ, NOTES: str(notes_file)},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
         )
 
-    def left_alone(self, folder: File) -> None:
+    def draw(self, folder: str) -> None:
+        """What a process does that may be killed."""
+        phase_diagram(
+            self.diagram,
+            folder,
+            workers=self.workers,
+            finest=self.finest,
+            resume=True,
+            progress=False,
+            solve=noted,
+        )
+
+    def draw_in_one_run(self, folder: File) -> None:
         """Draw it in a folder by the command, from nothing."""
         options = ["--finest", str(self.finest), "--workers", str(self.workers), "--quiet"]
         command = [sys.executable, "-m", "der", "phase", self.diagram, "--out", str(folder)]
         subprocess.run([*command, *options], check=True)
 
 
-def draw(wanted: Wanted, folder: str) -> None:
-    """What a process does that may be killed."""
-    run_phase(
-        wanted.diagram,
-        folder,
-        workers=wanted.workers,
-        finest=wanted.finest,
-        resume=True,
-        quiet=True,
-        solve=noted,
-    )
-
-
 def killed(wanted: Wanted, folder: File, *, times: int, seed: int) -> Killed:
-    """A diagram left alone and one killed so many times, in two folders of ``folder``."""
-    alone, apart, told = folder / "left_alone", folder / "killed", folder / "begun.txt"
+    """A diagram drawn in one run and in one killed so often, in two folders of ``folder``."""
+    undisturbed, apart, notes_file = folder / "one_run", folder / "killed", folder / "begun.txt"
     began = time.monotonic()
-    wanted.left_alone(alone)
-    whole = time.monotonic() - began
+    wanted.draw_in_one_run(undisturbed)
+    taken = time.monotonic() - began
     draws = random.Random(seed)
     ready = _time_to_start(wanted, folder)
-    share = 2.0 * max(whole - ready, 1.0) / times  # twice the mean: the kills cover the run
+    share = 2.0 * max(taken - ready, 1.0) / times  # twice the mean: the kills cover the run
 
     def moment(process: Process) -> None:
         early = draws.random() < EARLY
         wait = draws.uniform(0.0, ready) if early else ready + draws.uniform(0.0, share)
-        try:
+        with suppress(subprocess.TimeoutExpired):
             process.wait(wait)
-        except subprocess.TimeoutExpired:
-            return
 
     flight = kill_and_resume(
-        lambda: wanted.start(apart, told), [moment] * times, apart / STORE, told
+        lambda: wanted.start(apart, notes_file), [moment] * times, apart / STORE, notes_file
     )
-    begun = notes(told)
+    begun = notes(notes_file)
     return Killed(
         len(flight),
         len(begun),
         begun.total(),
         flight,
         (apart / STORE).read_bytes().count(b"\n"),
-        {name: _same(alone / name, apart / name) for name in TABLES},
+        {name: _same(undisturbed / name, apart / name) for name in TABLES},
     )
 
 
 def _time_to_start(wanted: Wanted, folder: File) -> float:
     """Seconds until a run begins its first case."""
-    told = folder / "first.txt"
+    notes_file = folder / "first.txt"
     began = time.monotonic()
-    process = wanted.start(folder / "first", told)
-    while not told.exists() and process.poll() is None:
+    process = wanted.start(folder / "first", notes_file)
+    while not notes_file.exists() and process.poll() is None:
         time.sleep(0.01)
     ready = time.monotonic() - began
     kill(process)
@@ -269,23 +267,23 @@ def _same(one: File, other: File) -> bool:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command; 0 if all is as it should be."""
-    words = Arguments(__file__, __doc__)
-    words.add_argument("--times", type=int, default=20, help="kills (20)")
-    words.add_argument("--diagram", default="fig3a", help="see der phase (fig3a)")
-    words.add_argument("--finest", type=int, default=16, help="cells along a side (16)")
-    words.add_argument("--workers", type=int, default=2, help="processes (2)")
-    words.add_argument("--seed", type=int, default=1, help="of the random times (1)")
-    words.add_argument("--out", metavar="DIR", help="keep everything here")
-    given = words.parse_args(arguments)
+    parser = Arguments(__file__, __doc__)
+    parser.add_argument("--times", type=int, default=20, help="kills (20)")
+    parser.add_argument("--diagram", default="fig3a", help="see der phase (fig3a)")
+    parser.add_argument("--finest", type=int, default=16, help="cells along a side (16)")
+    parser.add_argument("--workers", type=int, default=2, help="processes (2)")
+    parser.add_argument("--seed", type=int, default=1, help="of the random times (1)")
+    parser.add_argument("--out", metavar="DIR", help="keep everything here")
+    given = parser.parse_args(arguments)
     for name in ("times", "workers"):
         if getattr(given, name) < 1:
-            words.error(f"{name} must be a whole number from 1, got {getattr(given, name)}")
-    wanted = Wanted(given.diagram, given.finest, given.workers)
+            parser.error(f"{name} must be a whole number from 1, got {getattr(given, name)}")
     with tempfile.TemporaryDirectory() as beside:
         folder = File(given.out or beside)
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            words.error(f"out must be an empty folder, got {given.out!r}")
+            parser.error(f"out must be an empty folder, got {given.out!r}")
+        wanted = Wanted(given.diagram, given.finest, given.workers)
         found = killed(wanted, folder, times=given.times, seed=given.seed)
     print(f"{given.diagram}, finest {given.finest}, {given.workers} workers: {found}")
     return 0 if found.ok else 1

@@ -151,14 +151,14 @@ def _done(tried: Iterable[Case], width: int) -> Iterator[tuple[Case, tuple[Failu
     things = [_Numbered(place, case) for place, case in enumerate(tried)]
     batches = [tuple(things[k : k + BATCH]) for k in range(0, len(things), BATCH)]
     ready: dict[int, _Done] = {}
-    told = 0
+    given = 0
     with started(width) as crew:
         for batch, results in Jobs(crew, _repeated, batches).done():
             for thing, result in zip(batch, results or map(_died, batch), strict=True):
                 ready[thing.place] = result
-            while told in ready:
-                yield things[told].case, *ready.pop(told)
-                told += 1
+            while given in ready:
+                yield things[given].case, *ready.pop(given)
+                given += 1
 
 
 def _repeated(batch: tuple[_Numbered, ...]) -> list[_Done]:

@@ -1,4 +1,4 @@
-"""What became of the cases of a stress run: counted, told and kept."""
+"""What became of the cases of a stress run: counted, shown and saved."""
 
 from __future__ import annotations
 

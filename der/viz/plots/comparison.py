@@ -11,10 +11,9 @@ from matplotlib.figure import Figure
 
 from der.records.comparison import Comparison
 from der.records.path import Path
-from der.utils.files import FilePath
 from der.viz.curve import smooth
 from der.viz.palette import QUIET, STABLE, UNSTABLE
-from der.viz.plots.style import ENERGY, GAMMA, MOMENT, blank, label_axes, legend_below, save
+from der.viz.plots.style import ENERGY, GAMMA, MOMENT, blank, label_axes, legend_below
 from der.viz.titles import SOLVERS, title
 
 ROD, BVP = UNSTABLE, STABLE  # colours
@@ -22,12 +21,7 @@ FLOOR = 1e-13  # of the distances drawn: rounding
 
 
 def draw(comparison: Comparison) -> Figure:
-    """The picture of a comparison: M and U of both solvers over distances and their error bars.
-
-    Parameters
-    ----------
-    comparison : with the paths `rod` and `bvp`, and `states` with distances and bars.
-    """
+    """The picture of a comparison: M and U of both solvers over distances and their error bars."""
     rod, bvp = comparison.rod, comparison.bvp
     figure = blank(8.0, 7.0, title(rod, f"{bvp.numerics['intervals']} intervals"))
     grid = figure.add_gridspec(
@@ -72,11 +66,3 @@ def _draw_distances(axes: Axes, states: Any, name: str) -> None:
     if np.isfinite(allowed).any():
         axes.semilogy(gamma, allowed, label="error bar", **_points("_", 8, QUIET))
     axes.set_ylim(bottom=0.5 * FLOOR)
-
-
-figure_of_comparison = draw  # until callers are moved
-
-
-def save_comparison(comparison: Any, file: FilePath) -> None:
-    """Write the picture of a comparison."""
-    save(draw(comparison), file)

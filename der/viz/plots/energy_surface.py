@@ -148,6 +148,3 @@ def _finer(surface: Surface) -> tuple[Array, Array, Array]:
     gamma, distance = np.meshgrid(*finer, indexing="ij")
     height = RegularGridInterpolator(axes, surface.energy)((gamma, distance))
     return gamma / math.pi, distance, height
-
-
-figure_of_surface = draw  # until callers are moved

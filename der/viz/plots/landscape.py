@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from der.records.landscape import BarrierCurves, Landscape, Pass, Rest
+from der.records.landscape import Landscape, Rest
 from der.utils.checks import Array
 from der.viz.palette import INK, QUIET
-from der.viz.plots import barriers, minimum_energy_path
 from der.viz.plots.style import (
     ENERGY,
     GAMMA,
@@ -33,18 +32,14 @@ from der.viz.titles import sure, title
 KINDS = {"well": mark("o", 5.6, INK), "saddle": mark("^", 6.6)}  # of M = 0 states
 
 
-def draw(landscape: Landscape | BarrierCurves | Pass) -> Figure:
-    """The picture of a landscape along the path, of barriers over h/t, or of a pass.
+def draw(landscape: Landscape) -> Figure:
+    """The picture of a landscape along the path: U over M, beside U from saddle to folded ring.
 
     Raises
     ------
     ValueError
-        If the path has no state, or there is no pass.
+        If the path has no state.
     """
-    if isinstance(landscape, BarrierCurves):
-        return barriers.draw(landscape)
-    if isinstance(landscape, Pass):
-        return minimum_energy_path.draw(landscape)
     path = landscape.path
     if not len(path):
         raise ValueError("landscape must have at least one state to be plotted, got none")
@@ -133,7 +128,3 @@ def _barrier(axes: Axes, x: float, low: Rest, high: Rest, across: Iterable[float
     look: dict[str, Any] = {"arrowstyle": "<|-|>", "color": INK, "linewidth": 0.9}
     look |= {"shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (x, high.energy), xytext=(x, low.energy), arrowprops=look, zorder=4)
-
-
-figure_of_landscape = draw  # until callers are moved
-figure_of_barriers = figure_of_pass = draw

@@ -252,6 +252,3 @@ def _ranked(found: LeastPush, kind: str) -> list[Push]:
         key = (start, one is not best, one.falls, one.points, one.direction, k)
         keyed.append((key, one))
     return [one for _, one in sorted(keyed, key=lambda pair: pair[0])]
-
-
-figure_of_push = draw  # until callers are moved

@@ -13,7 +13,6 @@ from matplotlib.ticker import MaxNLocator
 from der.records.configurations import Shapes
 from der.records.path import Mode, Path
 from der.utils.checks import Array
-from der.utils.files import FilePath
 from der.viz.curve import smooth
 from der.viz.palette import INK, POINTS
 from der.viz.plots.rings import bare, place_ribbon
@@ -29,7 +28,6 @@ from der.viz.plots.style import (
     legend_below,
     mark,
     place_letters,
-    save,
     stretch_entries,
     zero_line,
 )
@@ -147,11 +145,3 @@ def _draw_ribbons(row: Axes, path: Path, shapes: Shapes, chosen: list[int]) -> N
         text = rf"$\bf{{{LETTERS[i]}}}$   $\gamma$ = {times_pi(path.gamma[chosen[i]])}"
         row.text(i * slot, -tall / 2, text, ha="center", va="top", fontsize=8, color=INK)
     bare(row, (-slot / 2, -0.62 * tall), ((len(ribbons) - 0.5) * slot, 0.5 * tall))
-
-
-figure_of_path = draw  # until callers are moved
-
-
-def save_plot(path: Path, file: FilePath) -> None:
-    """Write the picture of a path."""
-    save(draw(path), file)

@@ -10,11 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from der.records.planar import FOLDED, PlanarState, PlanarStates, Squeeze
+from der.records.planar import FOLDED, PlanarState, PlanarStates
 from der.utils.checks import Array
 from der.viz.palette import INK, STABLE, UNSTABLE
-from der.viz.plots import squeeze
-from der.viz.plots.rings import LARGER, closed_curve, strands_apart
+from der.viz.plots.rings import LARGER, closed_curve, draw_closed, strands_apart
 from der.viz.plots.style import blank, entry, legend_below
 from der.viz.titles import title
 
@@ -24,8 +23,8 @@ APART = 0.16  # of the radius: how far the strands of an n-covered circle are dr
 _ROUND, _ZERO = 1e-6, 1e-9  # of the radius; GJ/a: rounding
 
 
-def draw(found: PlanarStates | Squeeze) -> Figure:
-    """The picture of the states of a ring in its plane, or of how it is squeezed there.
+def draw(found: PlanarStates) -> Figure:
+    """The picture of the states of a ring in its plane.
 
     Raises
     ------
@@ -34,10 +33,6 @@ def draw(found: PlanarStates | Squeeze) -> Figure:
     """
     if not len(found):
         raise ValueError("states must be at least one to be plotted, got none")
-    return _states(found) if isinstance(found, PlanarStates) else squeeze.draw(found)
-
-
-def _states(found: PlanarStates) -> Figure:
     rows = math.ceil(len(found) / COLUMNS)
     columns = math.ceil(len(found) / rows)
     width, height = max(columns * CELL, 5.4) + 0.3, rows * ROW + 0.95
@@ -55,7 +50,7 @@ def _states(found: PlanarStates) -> Figure:
         axes.set_axis_off()
         if shapes:
             half = 0.54 * max(extents[k], max(extents) / LARGER)
-            squeeze.draw_curve(axes, shapes[k], _colour(state), half)
+            draw_closed(axes, shapes[k], _colour(state), half)
         _caption(axes, state)
     kinds = ((True, "stable in its plane", STABLE), (False, "unstable in its plane", UNSTABLE))
     there_are = {state.stable for state in found.states}
@@ -95,6 +90,3 @@ def _drawn(x: Array) -> Array:
     if float(np.ptp(radius)) <= _ROUND * float(radius.mean()) and np.ptp(turns) > 2.1 * math.pi:
         x = strands_apart(x, APART)
     return closed_curve(x)
-
-
-figure_of_planar = draw  # until callers are moved

@@ -104,3 +104,10 @@ def bare(axes: Axes, low: tuple[float, float], high: tuple[float, float]) -> Non
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.set_axis_off()
+
+
+def draw_closed(axes: Axes, x: Array, colour: str, half: float) -> None:
+    """Draw a closed curve (n, 2) in the middle of axes that reach ``half`` to its sides."""
+    axes.plot(*x.T, color=colour, linewidth=1.6, solid_joinstyle="round")
+    middle = box_middle(x)
+    bare(axes, tuple(middle - half), tuple(middle + half))

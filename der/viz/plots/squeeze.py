@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from der.records.planar import Squeeze
 from der.utils.checks import Array
 from der.viz.palette import INK, STABLE, UNSTABLE
-from der.viz.plots.rings import bare, box_middle, closed_curve
+from der.viz.plots.rings import closed_curve, draw_closed
 from der.viz.plots.style import (
     ENERGY,
     MARKS,
@@ -35,7 +35,15 @@ LINE: dict[bool, dict[str, Any]] = {
 
 
 def draw(found: Squeeze) -> Figure:
-    """The picture of a ring that is squeezed or pulled in its plane."""
+    """The picture of a ring that is squeezed or pulled in its plane.
+
+    Raises
+    ------
+    ValueError
+        If there is no state.
+    """
+    if not len(found):
+        raise ValueError("states must be at least one to be plotted, got none")
     pulled = found.distance[-1] > found.distance[0]
     figure = blank(7.6, 5.6, title(found, "pulled" if pulled else "squeezed", mesh=False))
     chosen = _chosen(found)
@@ -58,13 +66,6 @@ def draw(found: Squeeze) -> Figure:
     return figure
 
 
-def draw_curve(axes: Axes, x: Array, colour: str, half: float) -> None:
-    """Draw a closed curve (n, 2) in the middle of axes that reach ``half`` to its sides."""
-    axes.plot(*x.T, color=colour, linewidth=1.6, solid_joinstyle="round")
-    middle = box_middle(x)
-    bare(axes, tuple(middle - half), tuple(middle + half))
-
-
 def _chosen(found: Squeeze) -> list[int]:
     """States that are drawn: evenly along the curve of energy over distance."""
     spans = [max(float(np.ptp(c)), 1e-300) for c in (found.distance, found.energy)]
@@ -80,7 +81,7 @@ def _draw_shapes(figure: Figure, found: Squeeze, x: Array, chosen: list[int]) ->
     share = 0.94 / len(chosen)
     for k, (at, one) in enumerate(zip(chosen, x, strict=True)):
         axes = figure.add_axes((0.03 + share * k, 0.63, share, 0.3))
-        draw_curve(axes, closed_curve(one), LINE[found.index[at] == 0]["color"], half)
+        draw_closed(axes, closed_curve(one), LINE[found.index[at] == 0]["color"], half)
         spots = 0.5 * (one + np.roll(one, 1, axis=0))[[0, len(one) // 2]]
         axes.plot(*spots.T, "o", color=INK, markersize=4.0, zorder=4)
         text = rf"$\bf{{{LETTERS[k]}}}$   $d/a$ = {found.distance[at]:.3g}"

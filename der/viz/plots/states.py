@@ -236,6 +236,3 @@ def _entries(found: States, shown: tuple[RingState, ...]) -> list[Any]:
         arrow: dict[str, Any] = {"color": ARROW, "linewidth": 0.9, "marker": ">", "markersize": 4}
         handles.append(entry("relaxes to, energy released  [GJ/a]", **arrow))
     return handles
-
-
-figure_of_states = draw  # until callers are moved

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path as File
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,9 @@ from matplotlib.patheffects import withStroke
 
 from der.records.path import Path
 from der.utils.checks import Array
-from der.utils.files import FilePath, write_whole
+from der.utils.files import FilePath
 from der.viz.curve import stretches
+from der.viz.files import checked_suffix, write
 from der.viz.palette import INK, QUIET, STRETCHES
 
 FORMATS = (".png", ".pdf", ".svg")
@@ -48,18 +48,10 @@ def save(figure: Figure, file: FilePath) -> None:
     ValueError
         If the suffix is not one of FORMATS or the file cannot be written.
     """
-    suffix = File(file).suffix.lower()
-    if suffix not in FORMATS:
-        raise ValueError(f"plot must end in {', '.join(FORMATS)}, got {str(file)!r}")
+    suffix = checked_suffix("plot", file, FORMATS)
     # the version of matplotlib in it would make the same picture another file
     metadata: dict[str, Any] = {"Software": None} if suffix == ".png" else {}
-    try:
-        write_whole(
-            file, lambda opened: figure.savefig(opened, format=suffix[1:], metadata=metadata)
-        )
-    except OSError as problem:
-        reason = problem.strerror or problem
-        raise ValueError(f"plot {str(file)!r} cannot be written: {reason}") from problem
+    write("plot", file, lambda at: figure.savefig(at, format=suffix[1:], metadata=metadata))
 
 
 def blank(width: float, height: float, title: str, *, dpi: int = DPI) -> Figure:
@@ -168,6 +160,3 @@ def legend_below(figure: Figure, handles: Sequence[Any], *, fontsize: float = 8.
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()
-
-
-save_figure = save  # until callers are moved

@@ -14,41 +14,41 @@ from rerun.blueprint.encodings import (
     VisualizerComponentMapping,
 )
 
-from der.viz.animation import ENERGIES, Playback
-from der.viz.axes2d import HIGH, WIDE
+from der.viz.animation import ENERGIES, Motion
+from der.viz.rerun.axes import HIGH, WIDE
 
-UNDER = ("first", "second")  # where two films that are beside each other put their entities
+UNDER = ("first", "second")  # where two motions that are beside each other put their sent
 SOLVING = "solving"  # entity and timeline of the states as they are found
-FPS, FILM = 30.0, 10.0  # frames a second at most; seconds that a film of fewer states lasts
+FPS, FILM = 30.0, 10.0  # frames a second at most; seconds that a motion of fewer states lasts
 CAMERA = np.array([3.1, 1.75, 1.3])  # from the middle, over the mean radius; the ring lies in y, z
 PAPER, NIGHT = (243, 243, 240), (13, 16, 17)  # of the ring's views; of panels, as labels' boxes
 
 
 def while_solving() -> rrb.Blueprint:
-    """The last state that was found, until there is a film."""
+    """The last state that was found, until there is a motion."""
     view = rrb.Spatial3DView(origin=SOLVING, name="solving", background=PAPER, line_grid=False)
     panel = rrb.TimePanel(timeline=SOLVING, play_state="following", state="collapsed")
     return rrb.Blueprint(view, panel, *_aside())
 
 
-def layout(film: Playback) -> rrb.Blueprint:
+def layout(motion: Motion) -> rrb.Blueprint:
     """The ring on the left, once for each energy; curves, series and words on the right."""
-    n = len(film.x)
+    n = len(motion.x)
     curves = rrb.Horizontal(
         _curve_view("moment", "M a/GJ over gamma"), _curve_view("energy", "U a/GJ over gamma")
     )
     right = rrb.Vertical(curves, _series(n), _states(n), _words(), row_shares=[4, 3, 1.7, 3])
-    whole = rrb.Horizontal(_ring_and_key(film), right, column_shares=[1.05, 1])
+    whole = rrb.Horizontal(_ring_and_key(motion), right, column_shares=[1.05, 1])
     return rrb.Blueprint(whole, _time(n), *_aside())
 
 
-def beside(films: Sequence[Playback], called: Sequence[str]) -> rrb.Blueprint:
+def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
     """Two rings beside each other above; the curves of both, and words, below."""
-    n = len(films[0].x)
-    size = max(film.size for film in films)
+    n = len(motions[0].x)
+    size = max(motion.size for motion in motions)
     rings = [
-        _ring_view("bending", film, under=f"{under}/", name=name, size=size)
-        for under, film, name in zip(UNDER, films, called, strict=True)
+        _ring_view("bending", motion, under=f"{under}/", name=name, size=size)
+        for under, motion, name in zip(UNDER, motions, called, strict=True)
     ]
     curves = [
         rrb.Spatial2DView(
@@ -82,9 +82,9 @@ def beside(films: Sequence[Playback], called: Sequence[str]) -> rrb.Blueprint:
     return rrb.Blueprint(rrb.Horizontal(above, right, column_shares=[1.35, 1]), _time(n), *_aside())
 
 
-def terrain(film: Playback, *, well: bool, surface: bool) -> rrb.Blueprint:
+def landscape_layout(motion: Motion, *, well: bool, surface: bool) -> rrb.Blueprint:
     """The ring on the left; on the right the landscape, in one dimension or in both."""
-    n = len(film.x)
+    n = len(motion.x)
     bounds = _bounds(-24, WIDE + 26, -HIGH - 10, 14)
     whole = rrb.Spatial2DView(
         origin="landscape/whole",
@@ -102,7 +102,7 @@ def terrain(film: Playback, *, well: bool, surface: bool) -> rrb.Blueprint:
     words = rrb.Horizontal(_words(), _series_view(n, "M and gamma", ["moment", "gamma"]))
     if not surface:
         right = rrb.Vertical(panels, _states(n), words, row_shares=[5, 1.2, 3])
-        left = _ring_and_key(film)
+        left = _ring_and_key(motion)
         return rrb.Blueprint(
             rrb.Horizontal(left, right, column_shares=[1, 1.25]), _time(n), *_aside()
         )
@@ -119,16 +119,16 @@ def terrain(film: Playback, *, well: bool, surface: bool) -> rrb.Blueprint:
         line_grid=False,
         eye_controls=eye,
     )
-    views = rrb.Horizontal(_ring_view("bending", film), relief, column_shares=[1, 1.5])
+    views = rrb.Horizontal(_ring_view("bending", motion), relief, column_shares=[1, 1.5])
     above = rrb.Vertical(views, _key(), row_shares=[7, 1])
     return rrb.Blueprint(
         rrb.Vertical(above, rrb.Horizontal(panels, words), row_shares=[2, 1]), _time(n), *_aside()
     )
 
 
-def _ring_and_key(film: Playback) -> rrb.Vertical:
+def _ring_and_key(motion: Motion) -> rrb.Vertical:
     """The ring once for each energy, and the colours of both."""
-    ring = [_ring_view(name, film) for name in ENERGIES]
+    ring = [_ring_view(name, motion) for name in ENERGIES]
     return rrb.Vertical(rrb.Horizontal(*ring), _key(), row_shares=[9, 1])
 
 
@@ -183,7 +183,7 @@ def _aside() -> tuple[rrb.BlueprintPanel, rrb.SelectionPanel]:
 
 def _ring_view(
     energy: str,
-    film: Playback,
+    motion: Motion,
     *,
     under: str = "",
     name: str = "",
@@ -201,7 +201,7 @@ def _ring_view(
         ComponentSourceKind.SourceComponent,
         source_component=f"{energy}:colors",
     )
-    times = film.section.factor
+    times = motion.section.factor
     scale = "" if times == 1.0 else f" (section drawn {times:g} times as large)"
     past = rrb.VisibleTimeRanges(
         timeline="step",
@@ -210,7 +210,7 @@ def _ring_view(
     )
     eye = rrb.EyeControls3D(
         kind="orbital",
-        position=(size or film.size) * CAMERA,
+        position=(size or motion.size) * CAMERA,
         look_target=[0.0, 0.0, 0.0],
         eye_up=[0.0, 0.0, 1.0],
     )
@@ -252,6 +252,6 @@ def _bounds(left: float, right: float, top: float, bottom: float) -> rrb.VisualB
 
 
 def _whole(n: int) -> rr.TimeRange:
-    """All steps of a film."""
+    """All steps of a motion."""
     first, last = (rr.TimeRangeBoundary.absolute(seq=k) for k in (0, n - 1))
     return rr.TimeRange(start=first, end=last)

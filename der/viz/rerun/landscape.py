@@ -11,10 +11,10 @@ import rerun as rr
 from der.records.energy_surface import Surface
 from der.records.landscape import Landscape, Rest
 from der.utils.checks import Array
-from der.viz.animation import Playback, middles
-from der.viz.axes2d import Panel
-from der.viz.rerun.entities import CHALK, INK, ORANGE, SKY, VERMILION, Reel
-from der.viz.rerun.panels import send_axes, send_curve, send_labels
+from der.viz.animation import Motion, middles
+from der.viz.rerun.axes import PlotAxes
+from der.viz.rerun.curves import send_axes, send_curve, send_labels
+from der.viz.rerun.entities import CHALK, INK, ORANGE, SKY, VERMILION, Entities
 from der.viz.ribbon import viridis
 
 CEILING = 1.35  # of the path's largest energy: what lies above is not shown
@@ -26,26 +26,26 @@ COLOURS = {"well": SKY, "saddle": VERMILION}
 # --- Along the path --------------------------------------------------------------------------
 
 
-def send_landscape(reel: Reel, landscape: Landscape) -> None:
+def send_landscape(sent: Entities, landscape: Landscape) -> None:
     """U over gamma with all branches, rests and barriers; where there is one, the well larger."""
     path, found = landscape.path, landscape.barriers
-    whole = Panel(path.gamma, path.energy)
-    _send_part(reel, landscape, "landscape/whole", whole)
+    whole = PlotAxes(path.gamma, path.energy)
+    _send_part(sent, landscape, "landscape/whole", whole)
     if found.saddle is None:
         return
     flat, saddle = landscape.rests[0], landscape.rests[found.saddle]
     if found.fold is not None:
         text = f"to fold {found.fold:.4g}"
-        _send_barrier(reel, "landscape/whole/fold", whole, flat, saddle, 0.05, text)
+        _send_barrier(sent, "landscape/whole/fold", whole, flat, saddle, 0.05, text)
     if found.open is not None:
         folded = landscape.rests[-1]
         part = well(landscape)
-        _send_part(reel, landscape, "landscape/well", part)
+        _send_part(sent, landscape, "landscape/well", part)
         text = f"to open {found.open:.4g}"
-        _send_barrier(reel, "landscape/well/open", part, folded, saddle, 0.9, text)
+        _send_barrier(sent, "landscape/well/open", part, folded, saddle, 0.9, text)
 
 
-def well(landscape: Landscape) -> Panel:
+def well(landscape: Landscape) -> PlotAxes:
     """The panel of the saddle and the folded ring's well, which are small beside the way up.
 
     The landscape must have a barrier to open the ring.
@@ -55,7 +55,7 @@ def well(landscape: Landscape) -> Panel:
         raise ValueError("landscape must have a barrier to open, got none")
     saddle, end = landscape.rests[found.saddle], landscape.rests[-1]
     span = end.gamma - saddle.gamma
-    return Panel(
+    return PlotAxes(
         landscape.path.gamma,
         landscape.path.energy,
         window=(
@@ -65,10 +65,10 @@ def well(landscape: Landscape) -> Panel:
     )
 
 
-def _send_part(reel: Reel, landscape: Landscape, entity: str, panel: Panel) -> None:
+def _send_part(sent: Entities, landscape: Landscape, entity: str, panel: PlotAxes) -> None:
     """A panel of it, with its rests."""
-    send_axes(reel, entity, panel)
-    send_curve(reel, landscape.path, "energy", panel=panel, entity=entity)
+    send_axes(sent, entity, panel)
+    send_curve(sent, landscape.path, "energy", panel=panel, entity=entity)
     for kind, colour in COLOURS.items():
         rests = [rest for rest in landscape.rests if rest.kind == kind]
         places = panel.place([r.gamma for r in rests], [r.energy for r in rests]).reshape(-1, 2)
@@ -85,21 +85,21 @@ def _send_part(reel: Reel, landscape: Landscape, entity: str, panel: Panel) -> N
                 show_labels=True,
                 draw_order=40.0,
             )
-            reel.still(f"{entity}/{kind}", points)
+            sent.still(f"{entity}/{kind}", points)
 
 
 def _send_barrier(
-    reel: Reel, entity: str, panel: Panel, low: Rest, high: Rest, share: float, text: str
+    sent: Entities, entity: str, panel: PlotAxes, low: Rest, high: Rest, share: float, text: str
 ) -> None:
     """A level through the upper rest, and an arrow up to it from the lower one's level."""
     gamma = panel.gamma[0] + share * (panel.gamma[1] - panel.gamma[0])
     foot, top = panel.place([gamma, gamma], [low.energy, high.energy])
     level = panel.place([gamma, high.gamma], high.energy)
     base = panel.place([gamma, low.gamma], low.energy)
-    reel.still(f"{entity}/levels", rr.LineStrips2D([level, base], colors=CHALK, radii=0.25))
+    sent.still(f"{entity}/levels", rr.LineStrips2D([level, base], colors=CHALK, radii=0.25))
     arrow = rr.Arrows2D(origins=[foot], vectors=[top - foot], colors=CHALK, radii=0.5)
-    reel.still(f"{entity}/height", arrow)
-    send_labels(reel, f"{entity}/text", [0.5 * (foot + top) + [9.0, 0.0]], [text])
+    sent.still(f"{entity}/height", arrow)
+    send_labels(sent, f"{entity}/text", [0.5 * (foot + top) + [9.0, 0.0]], [text])
 
 
 # --- Over twist and distance -----------------------------------------------------------------
@@ -125,20 +125,20 @@ class Box:
         )
 
 
-def send_surface(reel: Reel, surface: Surface) -> None:
+def send_surface(sent: Entities, surface: Surface) -> None:
     """The least energy as a surface, coloured by it; the path, folds, rests, snaps; and now."""
     ceiling = CEILING * float(np.nanmax(surface.path[:, 2]))
     ends = [(float(v[0]), float(v[-1])) for v in (surface.gamma, surface.distance)]
     box = Box(ends[0], ends[1], ceiling)
-    _send_relief(reel, surface, box)
+    _send_relief(sent, surface, box)
     lift = 0.012 * ceiling  # lines lie on the surface, not in it
     turn, away, energy = surface.path.T
     shown = (turn >= ends[0][0]) & (turn <= ends[0][1])
     line = box.place(turn, away, energy + lift)[shown]
-    reel.still("surface/path", rr.LineStrips3D([line], colors=INK, radii=0.011))
+    sent.still("surface/path", rr.LineStrips3D([line], colors=INK, radii=0.011))
     for k, snap in enumerate(surface.snaps):
         over = box.place(snap[:, 0], snap[:, 1], snap[:, 2] + lift)
-        reel.still(f"surface/snaps/{k}", rr.LineStrips3D([over], colors=VERMILION, radii=0.008))
+        sent.still(f"surface/snaps/{k}", rr.LineStrips3D([over], colors=VERMILION, radii=0.008))
     for name, rows, colour in (("folds", surface.folds, ORANGE), ("rests", surface.rests, SKY)):
         if len(rows):
             places = box.place(rows[:, 0], rows[:, 1], rows[:, 2] + lift)
@@ -146,22 +146,22 @@ def send_surface(reel: Reel, surface: Surface) -> None:
             points = rr.Points3D(
                 places, colors=colour, radii=0.022, labels=[label] * len(rows), show_labels=False
             )
-            reel.still(f"surface/{name}", points)
-    film = reel.film
-    now = box.place(film.gamma, grip_distance(film), film.energy + lift)
-    reel.still("surface/now", rr.Points3D.from_fields(colors=(204, 121, 167), radii=0.05))
-    reel.run("surface/now", rr.Points3D.columns(positions=now.astype(np.float32)))
-    _send_box(reel, box)
+            sent.still(f"surface/{name}", points)
+    motion = sent.motion
+    now = box.place(motion.gamma, grip_distance(motion), motion.energy + lift)
+    sent.still("surface/now", rr.Points3D.from_fields(colors=(204, 121, 167), radii=0.05))
+    sent.run("surface/now", rr.Points3D.columns(positions=now.astype(np.float32)))
+    _send_box(sent, box)
 
 
-def grip_distance(film: Playback) -> Array:
+def grip_distance(motion: Motion) -> Array:
     """Distance (n,) between the grips along the twisting axis, a; negative where they passed."""
-    middle = middles(film.x)[..., 2]
+    middle = middles(motion.x)[..., 2]
     distance: Array = middle[:, middle.shape[1] // 2] - middle[:, 0]
     return distance
 
 
-def _send_relief(reel: Reel, surface: Surface, box: Box) -> None:
+def _send_relief(sent: Entities, surface: Surface, box: Box) -> None:
     """The surface as a mesh; cells that are unknown or above the ceiling are left out."""
     gamma, distance = np.meshgrid(surface.gamma, surface.distance, indexing="ij")
     energy = surface.energy
@@ -190,15 +190,15 @@ def _send_relief(reel: Reel, surface: Surface, box: Box) -> None:
         vertex_colors=viridis(np.where(known, energy, 0.0).ravel() / box.ceiling),
         triangle_indices=triangles.astype(np.uint32),
     )
-    reel.still("surface/energy", mesh)
+    sent.still("surface/energy", mesh)
 
 
-def _send_box(reel: Reel, box: Box) -> None:
+def _send_box(sent: Entities, box: Box) -> None:
     """Edges of the box at its foot, and ticks in words."""
     x, y, z = (np.array([-0.5, 0.5]) * side for side in SIDES)
     foot = [[x[0], y[0], z[0]], [x[1], y[0], z[0]], [x[1], y[1], z[0]], [x[0], y[1], z[0]]]
     lines = [[*foot, foot[0]], [foot[0], [x[0], y[0], z[1]]]]
-    reel.still("surface/axes", rr.LineStrips3D(lines, colors=(150, 150, 150), radii=0.004))
+    sent.still("surface/axes", rr.LineStrips3D(lines, colors=(150, 150, 150), radii=0.004))
     places, words = [], []
     for share in (0.0, 0.5, 1.0):
         turn = box.gamma[0] + share * (box.gamma[1] - box.gamma[0])
@@ -211,4 +211,4 @@ def _send_box(reel: Reel, box: Box) -> None:
         places.append([x[0] - 0.08, y[0], z[0] + share * SIDES[2]])
         words.append(f"U = {share * box.ceiling:.3g}")
     points = rr.Points3D(places, labels=words, radii=0.001, colors=PALE, show_labels=True)
-    reel.still("surface/values", points)
+    sent.still("surface/values", points)

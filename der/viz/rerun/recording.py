@@ -1,7 +1,7 @@
-"""A path as a film to scrub through: a rerun recording, in a file or served while it is made.
+"""A path as a motion to scrub through: a rerun recording, in a file or served while it is made.
 
 A recording is made in memory, column by column, once the path is known, and written whole or not
-at all. The main timeline is `step`, the steps of the film; since gamma turns back at folds,
+at all. The main timeline is `step`, the steps of the motion; since gamma turns back at folds,
 `gamma_mdeg` (millidegrees) is the second one.
 """
 
@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import socket
 from collections.abc import Sequence
-from pathlib import Path as File
 from typing import Self
 
 import numpy as np
@@ -20,14 +19,13 @@ from der.records.energy_surface import Surface
 from der.records.landscape import Landscape
 from der.records.path import Path
 from der.utils.checks import Array
-from der.utils.files import FilePath, write_whole
-from der.viz.animation import Playback, playback
-from der.viz.axes2d import HIGH, Panel
-from der.viz.captions import about, names, title
-from der.viz.rerun.blueprint import SOLVING, UNDER, beside, layout, terrain, while_solving
-from der.viz.rerun.entities import PAIR, VERMILION, Reel, send_ring
-from der.viz.rerun.landscape import send_landscape, send_surface
-from der.viz.rerun.panels import (
+from der.utils.files import FilePath
+from der.viz.animation import Motion, animate
+from der.viz.captions import about
+from der.viz.files import checked_suffix, write
+from der.viz.rerun.axes import HIGH, PlotAxes
+from der.viz.rerun.blueprint import SOLVING, UNDER, beside, landscape_layout, layout, while_solving
+from der.viz.rerun.curves import (
     send_axes,
     send_curve,
     send_events,
@@ -35,11 +33,14 @@ from der.viz.rerun.panels import (
     send_labels,
     send_series,
 )
-from der.viz.tween import in_step
+from der.viz.rerun.entities import PAIR, VERMILION, Entities, send_ring
+from der.viz.rerun.landscape import send_landscape, send_surface
+from der.viz.resampling import in_step, one_or_two
+from der.viz.titles import names
 
 APPLICATION = "ring_origami"
 SUFFIX = ".rrd"
-STEPS = 240  # of two films side by side
+STEPS = 240  # of two motions side by side
 
 
 def save_recording(
@@ -49,18 +50,17 @@ def save_recording(
 
     Parameters
     ----------
-    path : with shapes. Two move at equal gamma wherever there are any (`tween.in_step`), in steps
-        between their states.
-    rest : of one path, as in `film.playback`.
+    path : with shapes; two of them move at equal gamma where they can (`resampling.in_step`).
+    rest : of one path, as in `animation.animate`.
 
     Raises
     ------
     ValueError
         If the suffix is not .rrd, the place cannot be written to, there are more than two paths,
-        or `playback` refuses the rest.
+        or `animate` refuses the rest.
     """
-    _check_suffix(file)
-    _write(recording_bytes(path, rest=rest), file)
+    checked_suffix("rrd", file, [SUFFIX])
+    write("rrd", file, recording_bytes(path, rest=rest))
 
 
 def save_landscape(landscape: Landscape, file: FilePath, *, surface: Surface | None = None) -> None:
@@ -76,64 +76,51 @@ def save_landscape(landscape: Landscape, file: FilePath, *, surface: Surface | N
     ValueError
         If the suffix is not .rrd, the place cannot be written to, or there are no shapes.
     """
-    _check_suffix(file)
+    checked_suffix("rrd", file, [SUFFIX])
     path = landscape.path
-    film = playback(path)
-    stream = _stream(_identity(path, film), title(path, film))
+    motion = animate(path)
+    stream = _stream(_identity(path, motion), names([path])[0])
     memory = stream.memory_recording()
-    stream.send_blueprint(terrain(film, well=_has_well(landscape), surface=surface is not None))
-    reel = Reel(stream, film)
-    send_ring(reel)
-    send_key(reel)
-    send_landscape(reel, landscape)
+    stream.send_blueprint(
+        landscape_layout(motion, well=_has_well(landscape), surface=surface is not None)
+    )
+    sent = Entities(stream, motion)
+    send_ring(sent)
+    send_key(sent)
+    send_landscape(sent, landscape)
     if surface is not None:
-        send_surface(reel, surface)
-    send_series(reel, path)
-    send_events(reel, path)
-    _send_about(reel, about(path, film))
+        send_surface(sent, surface)
+    send_series(sent, path)
+    send_events(sent, path)
+    _send_about(sent, about(path, motion))
     content = memory.drain_as_bytes()
     stream.disconnect()
-    _write(content, file)
+    write("rrd", file, content)
 
 
 def recording_bytes(path: Path | Sequence[Path], *, rest: Array | None = None) -> bytes:
     """The recording as the bytes of its file; arguments and errors as in `save_recording`."""
-    paths = [path] if isinstance(path, Path) else list(path)
-    if len(paths) not in (1, 2):
-        raise ValueError(f"path must be one or two, got {len(paths)}")
+    paths = one_or_two(path)
     if len(paths) == 1:
-        film = playback(paths[0], rest=rest)
-        stream = _stream(_identity(paths[0], film), title(paths[0], film))
+        motion = animate(paths[0], rest=rest)
+        stream = _stream(_identity(paths[0], motion), names(paths)[0])
         memory = stream.memory_recording()
-        _send(stream, paths[0], film)
+        _send(stream, paths[0], motion)
     else:
-        films = in_step(paths, STEPS)
-        both = "".join(_identity(p, film) for p, film in zip(paths, films, strict=True))
+        motions = in_step(paths, STEPS)
+        both = "".join(_identity(p, motion) for p, motion in zip(paths, motions, strict=True))
         stream = _stream(hashlib.sha256(both.encode()).hexdigest()[:32], " and ".join(names(paths)))
         memory = stream.memory_recording()
-        _send_both(stream, paths, films)
+        _send_both(stream, paths, motions)
     content = memory.drain_as_bytes()
     stream.disconnect()
     return content
 
 
-def _check_suffix(file: FilePath) -> None:
-    if File(file).suffix != SUFFIX:
-        raise ValueError(f"rrd must end in {SUFFIX}, got {str(file)!r}")
-
-
-def _write(content: bytes, file: FilePath) -> None:
-    try:
-        write_whole(file, lambda opened: opened.write(content))
-    except OSError as problem:
-        reason = problem.strerror or problem
-        raise ValueError(f"rrd {str(file)!r} cannot be written: {reason}") from problem
-
-
 class Live:
     """A recording that is served for watching while the path is solved; a context.
 
-    `show` gives it the states one by one, on a timeline of their own; `finish` the whole film.
+    `show` gives it the states one by one, on a timeline of their own; `finish` the whole motion.
 
     Raises
     ------
@@ -158,11 +145,11 @@ class Live:
         self._shown += 1
 
     def finish(self, path: Path) -> None:
-        """Show the film of a path; errors as in `playback`."""
-        film = playback(path)
+        """Show the motion of a path; errors as in `animate`."""
+        motion = animate(path)
         self._stream.reset_time()
-        self._stream.send_recording_name(title(path, film))
-        _send(self._stream, path, film)
+        self._stream.send_recording_name(names([path])[0])
+        _send(self._stream, path, motion)
 
     def __enter__(self) -> Self:
         return self
@@ -192,47 +179,47 @@ def _stream(identity: str, name: str) -> rr.RecordingStream:
     return stream
 
 
-def _send(stream: rr.RecordingStream, path: Path, film: Playback) -> None:
-    """Send all of a film, its layout first."""
-    stream.send_blueprint(layout(film))
-    reel = Reel(stream, film)
-    send_ring(reel)
-    send_key(reel)
-    send_curve(reel, path, "moment")
-    send_curve(reel, path, "energy")
-    send_series(reel, path)
-    send_events(reel, path)
-    _send_about(reel, about(path, film))
+def _send(stream: rr.RecordingStream, path: Path, motion: Motion) -> None:
+    """Send all of a motion, its layout first."""
+    stream.send_blueprint(layout(motion))
+    sent = Entities(stream, motion)
+    send_ring(sent)
+    send_key(sent)
+    send_curve(sent, path, "moment")
+    send_curve(sent, path, "energy")
+    send_series(sent, path)
+    send_events(sent, path)
+    _send_about(sent, about(path, motion))
 
 
 def _send_both(
-    stream: rr.RecordingStream, paths: Sequence[Path], films: Sequence[Playback]
+    stream: rr.RecordingStream, paths: Sequence[Path], motions: Sequence[Motion]
 ) -> None:
-    """Send two films on one timeline: rings beside each other, curves in the same panels."""
+    """Send two motions on one timeline: rings beside each other, curves in the same panels."""
     called = names(paths)
-    stream.send_blueprint(beside(films, called))
-    top = max(film.top for film in films)
-    reels = [
-        Reel(stream, film, under=f"{under}/", gamma=films[0].gamma, top=top)
-        for under, film in zip(UNDER, films, strict=True)
+    stream.send_blueprint(beside(motions, called))
+    top = max(motion.top for motion in motions)
+    both = [
+        Entities(stream, motion, under=f"{under}/", gamma=motions[0].gamma, top=top)
+        for under, motion in zip(UNDER, motions, strict=True)
     ]
-    common = Reel(stream, films[0], top=top)
+    common = Entities(stream, motions[0], top=top)
     send_key(common)
     for name in ("moment", "energy"):
         gamma, heights = (
             np.concatenate([getattr(path, n) for path in paths]) for n in ("gamma", name)
         )
-        panel = Panel(gamma, heights)
+        panel = PlotAxes(gamma, heights)
         send_axes(common, f"curves/{name}", panel)
-        for k, (reel, path, colour) in enumerate(zip(reels, paths, PAIR, strict=True)):
-            send_curve(reel, path, name, panel=panel, colour=colour)
+        for k, (sent, path, colour) in enumerate(zip(both, paths, PAIR, strict=True)):
+            send_curve(sent, path, name, panel=panel, colour=colour)
             place = [[75.0, -HIGH - 12.0 + 7.0 * k]]
-            send_labels(reel, f"curves/{name}/name", place, [called[k]], colour=colour)
-    for reel, path, name, colour in zip(reels, paths, called, PAIR, strict=True):
-        send_ring(reel)
-        send_series(reel, path, name=name, colour=colour)
-        send_events(reel, path, name=name)
-    texts = [about(path, film) for path, film in zip(paths, films, strict=True)]
+            send_labels(sent, f"curves/{name}/name", place, [called[k]], colour=colour)
+    for sent, path, name, colour in zip(both, paths, called, PAIR, strict=True):
+        send_ring(sent)
+        send_series(sent, path, name=name, colour=colour)
+        send_events(sent, path, name=name)
+    texts = [about(path, motion) for path, motion in zip(paths, motions, strict=True)]
     _send_about(common, "\n\n".join([BESIDE, *texts]))
 
 
@@ -243,17 +230,23 @@ BESIDE = (
 )
 
 
-def _send_about(reel: Reel, text: str) -> None:
-    reel.still("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+def _send_about(sent: Entities, text: str) -> None:
+    sent.still("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
 
 def _has_well(landscape: Landscape) -> bool:
     return landscape.barriers.open is not None and landscape.barriers.saddle is not None
 
 
-def _identity(path: Path, film: Playback) -> str:
+def _identity(path: Path, motion: Motion) -> str:
     """A recording id that depends on what is shown, and not on when."""
-    digest = hashlib.sha256(about(path, film).encode())
-    for array in (film.x, film.frames, film.gamma, film.moment, film.energy):
+    digest = hashlib.sha256(about(path, motion).encode())
+    for array in (
+        motion.x,
+        motion.frames,
+        motion.gamma,
+        motion.moment,
+        motion.energy,
+    ):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:32]

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram.corners import CUSP, LIKE, Line, same
-from der.diagram.polylines import meetings, nearest
+from der.diagram.curves.corners import CUSP, LIKE, Line, same
+from der.diagram.curves.polylines import meetings, nearest
 
 BESIDE = 2e-3  # of the diagram's side: where the labels beside a curve are asked for,
 CLOSEST = 3e-5  # and beside one with another near it, at least: nearer, labels do not tell

@@ -17,9 +17,9 @@ from itertools import chain, combinations, product
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram.conditions import NotFound, Value, asymptotic, on, steepening
-from der.diagram.curve_tracing import DIFFERENCE, EXACT, At, Function, corrected
-from der.diagram.polylines import meetings, nearest
+from der.diagram.curves.conditions import NotFound, Value, asymptotic, on, steepening
+from der.diagram.curves.polylines import meetings, nearest
+from der.diagram.curves.tracing import EXACT, At, Function, by_differences, corrected
 from der.errors import ContinuationFailed
 
 FOLD = "foldability"
@@ -278,11 +278,7 @@ def _solved(
 
     start = u
     values, seeds = both(u, seeds)
-    rates = np.empty((2, 2))
-    for k in range(2):
-        step = np.zeros(2)
-        step[k] = DIFFERENCE if u[k] < 0.5 else -DIFFERENCE
-        rates[:, k] = (both(u + step, seeds)[0] - values) / step[k]
+    rates = by_differences(lambda u: both(u, seeds)[0], u, values)
     for _ in range(MOST):
         change = np.linalg.lstsq(rates, -values, rcond=None)[0]
         size = float(np.linalg.norm(change))

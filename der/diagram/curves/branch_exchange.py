@@ -128,17 +128,8 @@ def centre(
             bend = _bend(system, mesh, here, x, psi, sides=(1.0, 0.0))
         if bend is None:
             return None
-        # unknowns x, psi, mu
-        matrix = np.zeros((2 * n_p + 2, 2 * n_p + 2))
-        matrix[:n_p, : n_p + 1] = here.rates
-        matrix[:n_p, n_p + 1 : -1] = -mu * np.eye(n_p)
-        matrix[:n_p, -1] = -psi
-        matrix[n_p:-1, : n_p + 1] = bend
-        matrix[n_p:-1, n_p + 1 : -1] = here.rates.T
-        matrix[-1, n_p + 1 : -1] = 2.0 * psi
-        residual = np.concatenate([here.missed - mu * psi, here.rates.T @ psi, [psi @ psi - 1.0]])
         try:
-            change = np.linalg.solve(matrix, -residual)
+            change = _newton_step(here, bend, psi, mu)
         except np.linalg.LinAlgError:
             return None
         size = float(np.abs(change[: n_p + 1] / (1.0 + np.abs(x))).max())
@@ -151,6 +142,26 @@ def centre(
         if size < CONVERGED:
             return Centre(here, x, psi, mu, bend)
     return None
+
+
+def _newton_step(here: Shot, bend: Array, psi: Array, mu: float) -> Array:
+    """Newton's change (2 n_p + 2,) of x, psi and mu.
+
+    Raises
+    ------
+    LinAlgError
+        Where the equations are singular.
+    """
+    n_p = len(psi)
+    matrix = np.zeros((2 * n_p + 2, 2 * n_p + 2))
+    matrix[:n_p, : n_p + 1] = here.rates
+    matrix[:n_p, n_p + 1 : -1] = -mu * np.eye(n_p)
+    matrix[:n_p, -1] = -psi
+    matrix[n_p:-1, : n_p + 1] = bend
+    matrix[n_p:-1, n_p + 1 : -1] = here.rates.T
+    matrix[-1, n_p + 1 : -1] = 2.0 * psi
+    residual = np.concatenate([here.missed - mu * psi, here.rates.T @ psi, [psi @ psi - 1.0]])
+    return np.linalg.solve(matrix, -residual)
 
 
 def hysteresis(system: Collocation, mesh: Mesh, frames: Array, x: Array, psi: Array) -> float:

@@ -22,8 +22,8 @@ import numpy as np
 
 from der.bvp.collocation import Direction, required
 from der.bvp.gauss import Array
-from der.diagram.branch_exchange import Shot, shot
-from der.diagram.conditions import NotFound, Value, scaled
+from der.diagram.curves.branch_exchange import Shot, shot
+from der.diagram.curves.conditions import NotFound, Value, scaled
 from der.errors import ContinuationFailed
 from der.scene import Scene
 

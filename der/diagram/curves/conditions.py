@@ -25,7 +25,7 @@ from der.bvp.corrector import observe
 from der.bvp.gauss import Array
 from der.bvp.meshes import Mesh, fitted, mesh_at, moved_to
 from der.bvp.sectors import sector
-from der.diagram.branch_exchange import Centre, centre, hysteresis, shot
+from der.diagram.curves.branch_exchange import Centre, centre, hysteresis, shot
 from der.errors import ContinuationFailed, Reason
 from der.scene import Scene
 
@@ -52,9 +52,9 @@ class Value(NamedTuple):
     value: float
     at: Solution
     system: Collocation
-    psi: Array | None = None  # of an exchange, see `exchanges`: its state has no tangent
+    psi: Array | None = None  # of an exchange, see `branch_exchange`: its state has no tangent
     bend: Array | None = None  # likewise
-    way: Array | None = None  # of an infinite slope, see `folded_states`: across the boundary
+    way: Array | None = None  # of an infinite slope, see `infinite_slope`: across the boundary
     place: Array | None = None  # likewise: on the boundary, of which the state is
 
 
@@ -220,7 +220,7 @@ def _state(system: Collocation, mesh: Mesh, found: Centre) -> Solution:
 
 
 def asymptotic(state: Value) -> float:
-    """Zero where an exchange touches a cusp, see `exchanges.hysteresis`."""
+    """Zero where an exchange touches a cusp, see `branch_exchange.hysteresis`."""
     at, psi = state.at, state.psi
     if psi is None:
         raise NotFound("not the state of an exchange")

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from der.records.path import Path
 from der.utils.checks import Array
 from der.viz.animation import spread
-from der.viz.axes2d import Panel, dotted
-from der.viz.captions import WORDS, in_words
+from der.viz.captions import event_text
 from der.viz.curve import SNAP, stretches
-from der.viz.rerun.entities import CHALK, GREEN, ORANGE, QUIET, SKY, VERMILION, Colour, Reel
+from der.viz.palette import POINTS
+from der.viz.rerun.axes import PlotAxes, dotted
+from der.viz.rerun.entities import CHALK, GREEN, ORANGE, QUIET, SKY, VERMILION, Colour, Entities
 from der.viz.ribbon import viridis
 
 # label, colour and radius of a stretch of the curves by whether it is stable
@@ -42,18 +43,18 @@ STATES: dict[str, Colour] = {
 STEPS = rr.components.InterpolationMode.StepAfter  # a count stays until it changes
 
 
-def send_key(reel: Reel) -> None:
+def send_key(sent: Entities) -> None:
     """The colours of the energy density, as a bar."""
     share = np.linspace(0.0, 1.0, 65)
     bars = [[[300 * a, 0], [300 * b, 0]] for a, b in pairwise(share)]
     shades = viridis(0.5 * (share[1:] + share[:-1]))
-    reel.still("key/bar", rr.LineStrips2D(bars, colors=shades, radii=5.0))
-    ends = ["0", "energy density, GJ/a²", f"{reel.top:.3g}"]
-    send_labels(reel, "key/values", [[0, 14], [150, 14], [300, 14]], ends)
+    sent.still("key/bar", rr.LineStrips2D(bars, colors=shades, radii=5.0))
+    ends = ["0", "energy density, GJ/a²", f"{sent.top:.3g}"]
+    send_labels(sent, "key/values", [[0, 14], [150, 14], [300, 14]], ends)
 
 
 def send_labels(
-    reel: Reel,
+    sent: Entities,
     entity: str,
     places: ArrayLike,
     labels: Sequence[str],
@@ -62,15 +63,15 @@ def send_labels(
 ) -> None:
     """Words on a 2-D panel."""
     points = rr.Points2D(places, labels=labels, radii=0.01, colors=colour, show_labels=True)
-    reel.still(entity, points)
+    sent.still(entity, points)
 
 
 def send_curve(
-    reel: Reel,
+    sent: Entities,
     path: Path,
     name: str,
     *,
-    panel: Panel | None = None,
+    panel: PlotAxes | None = None,
     entity: str = "",
     colour: Colour | None = None,
 ) -> None:
@@ -82,11 +83,11 @@ def send_curve(
     entity : where it goes; ``curves/name`` if not given.
     colour : of the curve and its dot, where several share a panel.
     """
-    film, entity = reel.film, entity or f"curves/{name}"
+    motion, entity = sent.motion, entity or f"curves/{name}"
     heights: Array = getattr(path, name)
     if panel is None:
-        panel = Panel(path.gamma, heights)
-        send_axes(reel, entity, panel)
+        panel = PlotAxes(path.gamma, heights)
+        send_axes(sent, entity, panel)
     pieces = [
         (side, piece)
         for side, line in stretches(path, heights)
@@ -98,10 +99,10 @@ def send_curve(
             strips = [dash for strip in strips for dash in dotted(strip)]
         if strips:
             lines = rr.LineStrips2D(strips, colors=colour or own, radii=width)
-            reel.still(f"{entity}/{label}", lines)
+            sent.still(f"{entity}/{label}", lines)
     at = [point.position for point in path.points]
     if at:
-        labels = np.array([WORDS[point.kind] for point in path.points])
+        labels = np.array([POINTS[point.kind] for point in path.points])
         places = panel.place(path.gamma[at], heights[at])
         shown = panel.holds(places)
         marks = rr.Points2D(
@@ -111,18 +112,18 @@ def send_curve(
             labels=labels[shown].tolist(),
             show_labels=False,
         )
-        reel.still(f"{entity}/points", marks)
-    values: Array = getattr(film, name)
-    places = panel.place(film.gamma, values)
+        sent.still(f"{entity}/points", marks)
+    values: Array = getattr(motion, name)
+    places = panel.place(motion.gamma, values)
     known = np.isfinite(values) & panel.holds(places)
     dots = places[known]
     shade, size = (colour, 3.2) if colour else ((255, 255, 255), 2.4)
-    reel.still(f"{entity}/now", rr.Points2D.from_fields(colors=shade, radii=size, draw_order=50.0))
+    sent.still(f"{entity}/now", rr.Points2D.from_fields(colors=shade, radii=size, draw_order=50.0))
     columns = rr.Points2D.columns(positions=dots.astype(np.float32))
-    reel.run(f"{entity}/now", columns.partition(known.astype(int)))
+    sent.run(f"{entity}/now", columns.partition(known.astype(int)))
 
 
-def send_axes(reel: Reel, entity: str, panel: Panel) -> None:
+def send_axes(sent: Entities, entity: str, panel: PlotAxes) -> None:
     """The axes of a panel with their ticks."""
     foot = panel.values[0]
     across = panel.place(panel.gamma, foot)
@@ -134,78 +135,80 @@ def send_axes(reel: Reel, entity: str, panel: Panel) -> None:
     beside = panel.place(panel.gamma[0], panel.rounds)
     lines += [*np.stack([below, np.add(below, [0.0, 2.0])], axis=1)]
     lines += [*np.stack([beside, np.add(beside, [-2.0, 0.0])], axis=1)]
-    reel.still(f"{entity}/axes", rr.LineStrips2D(lines, colors=QUIET, radii=0.2))
+    sent.still(f"{entity}/axes", rr.LineStrips2D(lines, colors=QUIET, radii=0.2))
     places = np.concatenate([np.add(below, [0.0, 3.0]), np.add(beside, [-9.0, -4.0])])
     words = [f"{turn / math.pi:.5g} π" for turn in panel.turns]
     words += [f"{value:.6g}" for value in panel.rounds]
-    send_labels(reel, f"{entity}/values", places, words)
+    send_labels(sent, f"{entity}/values", places, words)
 
 
-def send_series(reel: Reel, path: Path, *, name: str = "", colour: Colour | None = None) -> None:
+def send_series(
+    sent: Entities, path: Path, *, name: str = "", colour: Colour | None = None
+) -> None:
     """M, U, gamma, the index and the lowest eigenvalues over the steps.
 
     Parameters
     ----------
     name, colour : of the ring, where there are several.
     """
-    film = reel.film
-    index = spread(np.ma.filled(path.index.astype(float), np.nan), film.position)
+    motion = sent.motion
+    index = spread(np.ma.filled(path.index.astype(float), np.nan), motion.position)
     series = {
-        "moment": (film.moment, "M a/GJ", SKY),
-        "gamma": (film.gamma, "gamma, rad", QUIET),
-        "energy": (film.energy, "U a/GJ", ORANGE),
+        "moment": (motion.moment, "M a/GJ", SKY),
+        "gamma": (motion.gamma, "gamma, rad", QUIET),
+        "energy": (motion.energy, "U a/GJ", ORANGE),
         "index": (index, "index", VERMILION),
     }
-    for k, (label, column) in enumerate(zip(film.classes, film.eigenvalues.T, strict=True)):
+    for k, (label, column) in enumerate(zip(motion.classes, motion.eigenvalues.T, strict=True)):
         series[f"eigenvalues/{label.replace(' ', '_')}"] = (column, label, CLASSES[k])
     for entity, (values, label, own) in series.items():
         known = np.isfinite(values)
         if known.any():
-            steps = np.flatnonzero(known | (film.position < 0))  # a nan breaks the line
+            steps = np.flatnonzero(known | (motion.position < 0))  # a nan breaks the line
             shape = STEPS if entity == "index" else rr.components.InterpolationMode.Linear
             said = f"{label.split(' ')[0].rstrip(',')}, {name}" if name else label
             style = rr.SeriesLines(
                 colors=colour or own, names=said, widths=2.0, interpolation_mode=shape
             )
-            reel.still(f"series/{entity}", style)
-            reel.run(f"series/{entity}", rr.Scalars.columns(scalars=values[steps]), steps)
+            sent.still(f"series/{entity}", style)
+            sent.run(f"series/{entity}", rr.Scalars.columns(scalars=values[steps]), steps)
 
 
 # --- Words ----------------------------------------------------------------------------------
 
 
-def send_events(reel: Reel, path: Path, *, name: str = "") -> None:
+def send_events(sent: Entities, path: Path, *, name: str = "") -> None:
     """Special points in the log; stability and the last event as lines over the steps.
 
     Parameters
     ----------
     name : of the ring, where there are several.
     """
-    film = reel.film
-    steps = [film.step_of(point.position) for point in path.points]
+    motion = sent.motion
+    steps = [motion.step_of(point.position) for point in path.points]
     before = f"{name}: " if name else ""
     if steps:
-        reel.run(
-            "events", rr.TextLog.columns(text=[before + in_words(p) for p in path.points]), steps
+        sent.run(
+            "events", rr.TextLog.columns(text=[before + event_text(p) for p in path.points]), steps
         )
-    kinds = [WORDS[point.kind] for point in path.points]
+    kinds = [POINTS[point.kind] for point in path.points]
     index = path.index.tolist()
     states: dict[int, str] = {}
-    for step, k in enumerate(film.position.tolist()):
+    for step, k in enumerate(motion.position.tolist()):
         if k < 0:
             states[step] = MOVING
         elif index[k] is not None:
             states[step] = f"index {index[k]}" if index[k] else "stable"
-    _send_states(reel, "states/stability", states)
-    _send_states(reel, "states/event", {0: "start", **dict(zip(steps, kinds, strict=True))})
+    _send_states(sent, "states/stability", states)
+    _send_states(sent, "states/event", {0: "start", **dict(zip(steps, kinds, strict=True))})
 
 
-def _send_states(reel: Reel, entity: str, states: Mapping[int, str]) -> None:
+def _send_states(sent: Entities, entity: str, states: Mapping[int, str]) -> None:
     """A line of states, each from its step on until another follows."""
     changes = [next(group) for _, group in groupby(sorted(states), key=lambda k: states[k])]
     if not changes:
         return
     values = sorted(set(states.values()))
     colours = [STATES.get(value, VERMILION) for value in values]
-    reel.still(entity, rr.StateConfiguration(values=values, colors=colours))
-    reel.run(entity, rr.StateChange.columns(state=[states[k] for k in changes]), changes)
+    sent.still(entity, rr.StateConfiguration(values=values, colors=colours))
+    sent.run(entity, rr.StateChange.columns(state=[states[k] for k in changes]), changes)

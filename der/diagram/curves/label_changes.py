@@ -15,7 +15,7 @@ from der.bvp.gauss import Array
 from der.bvp.sectors import sector
 from der.bvp.solve import solve_with_points
 from der.diagram.cases import Row
-from der.diagram.conditions import Value, closeness
+from der.diagram.curves.conditions import Value, closeness
 from der.errors import NotConverged
 
 SEED = 1e-9  # tolerance of the path that a condition starts from: it fixes the mesh carried along

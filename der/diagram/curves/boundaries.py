@@ -1,13 +1,18 @@
-"""The boundaries between folding modes, as curves through a phase diagram.
+"""The boundaries between folding modes of one slice of a phase diagram.
 
-Wherever neighbouring cases of a scan differ, something happens between them. Five things are
-conditions that can be followed across the diagram (`conditions`, `tracing`): the folded state loses
-its stability; the fold at which the path turns back reaches gamma = pi; it merges there with its
-mirror image, in the folded state, whose slope is infinite then; two folds merge in a cusp; the path
-from the flat ring changes partners with another one ("exchange"): it leads elsewhere then, or
-leaves folds behind on a closed one. Where curves meet, the corner is solved for (`corners`). A
-curve is kept from corner to corner where the labels on its two sides, solved for, differ by what it
-bounds. What no condition explains is found by bisection of the label between two cases.
+Where neighbouring cases of a scan differ, a boundary lies between them. Five kinds are curves on
+which a condition holds (`conditions`), and are traced across the slice (`tracing`):
+
+    stability        the folded state loses its stability at fixed moment
+    foldability      the fold at which the path turns back reaches gamma = pi
+    infinite slope   that fold merges with its mirror image in the folded state
+    snap-back        two folds merge in a cusp
+    exchange         the path from the flat ring exchanges branches with another one: it then leads
+                     elsewhere, or leaves folds behind on a closed one
+
+Where curves meet, the corner is solved for (`corners`). A curve is kept from corner to corner where
+the labels on its two sides, solved for, differ by what it bounds (`pruning`). Where no condition
+explains a difference, the boundary is found by bisection of the label between two cases.
 """
 
 from __future__ import annotations
@@ -18,15 +23,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
 from der.bvp.gauss import Array
 from der.diagram.cases import Case, Row, solve_case
-from der.diagram.conditions import KINDS, NotFound, Value, fresh, numbers, on
-from der.diagram.corners import FOLD, Line, Met, mark_corners
-from der.diagram.curve_pruning import (
+from der.diagram.curves.conditions import KINDS, NotFound, Value, fresh, numbers, on
+from der.diagram.curves.corners import FOLD, Line, Met, mark_corners
+from der.diagram.curves.infinite_slope import across, infinite_slope_near, is_half
+from der.diagram.curves.label_changes import Crossing, crossings_of, differences, seeds
+from der.diagram.curves.polylines import distance, loose_ends, meetings
+from der.diagram.curves.pruning import (
     BESIDE,
     SAME_CURVE,
     asked_beside,
@@ -35,11 +42,9 @@ from der.diagram.curve_pruning import (
     unlike,
     where,
 )
-from der.diagram.curve_tracing import At, Function, States, corrected, trace
+from der.diagram.curves.slices import Boundaries, Slice, SliceCases, Solve, joined, slices
+from der.diagram.curves.tracing import At, Function, States, corrected, trace
 from der.diagram.families import Family
-from der.diagram.infinite_slope import across, infinite_slope_near, is_half
-from der.diagram.label_changes import Crossing, Placed, crossings_of, differences, seeds
-from der.diagram.polylines import distance, loose_ends, meetings
 from der.diagram.scanned_boundaries import BoundaryPoint, Corner, Curve
 from der.errors import ContinuationFailed
 from der.scene import Scene
@@ -54,19 +59,9 @@ EXCHANGE = "exchange"
 INFINITE = "infinite slope"
 
 
-Solve = Callable[[Sequence[Case]], Sequence[Row]]  # cases -> their rows, in the same order
-
-
 def one_by_one(cases: Sequence[Case]) -> list[Row]:
     """The rows of cases, solved in this process."""
     return [solve_case(case) for case in cases]
-
-
-class Boundaries(NamedTuple):
-    """The boundaries of a diagram and their corners."""
-
-    curves: list[Curve]
-    corners: list[Corner]
 
 
 def boundaries(family: Family, rows: Sequence[Row], *, solve: Solve = one_by_one) -> Boundaries:
@@ -76,33 +71,8 @@ def boundaries(family: Family, rows: Sequence[Row], *, solve: Solve = one_by_one
     ----------
     solve : how the cases beside curves and between neighbours are solved, many at a time
     """
-    parts = [_Diagram(part, solve).boundaries() for part in slices(family, rows)]
+    parts = [_Search(SliceCases(part, solve)).located() for part in slices(family, rows)]
     return joined(parts)
-
-
-def joined(parts: Iterable[Boundaries]) -> Boundaries:
-    """The boundaries of all slices."""
-    found = Boundaries([], [])
-    for part in parts:
-        found.curves.extend(part.curves)
-        found.corners.extend(part.corners)
-    return found
-
-
-class Slice(NamedTuple):
-    """A unit square of a family, and what a scan has found there."""
-
-    family: Family
-    sheet: str
-    plane: float | None  # second coordinate, of a cube
-    placed: Placed
-
-    def has(self, case: Case) -> bool:
-        """Whether a case lies in it."""
-        unit = self.family.unit(case)
-        if unit is None or (case.twist_axis != self.sheet and case.b_over_a != 1.0):
-            return False
-        return self.plane is None or abs(unit[1] - self.plane) < 1e-9
 
 
 def slice_boundaries(
@@ -119,62 +89,26 @@ def slice_boundaries(
                 new.append(rows[case])
         return [rows[case] for case in cases]
 
-    return _Diagram(part, all_of).boundaries(), new
+    return _Search(SliceCases(part, all_of)).located(), new
 
 
-def slices(family: Family, rows: Sequence[Row]) -> list[Slice]:
-    """The squares of a diagram; of a cube at the scan's coarsest values of the second coordinate.
+class _Search:
+    """The search for what happens between the cases of a slice."""
 
-    Each with the rows in it, by their place.
-    """
-    found: dict[tuple[str, float | None], Placed] = defaultdict(dict)
-    for row in rows:
-        unit = family.unit(row.case)
-        if unit is None or not row.ok:
-            continue
-        plane = None
-        if family.dimension == 3:
-            middle = round(unit[1] * family.coarse)
-            if abs(unit[1] * family.coarse - middle) > 1e-6:
-                continue
-            plane = middle / family.coarse
-        for sheet in family.sheets:
-            if row.case.twist_axis == sheet or row.case.b_over_a == 1.0:
-                found[sheet, plane][unit[0], unit[-1]] = row
-    return [
-        Slice(family, sheet, plane, placed)
-        for (sheet, plane), placed in sorted(
-            found.items(), key=lambda item: (family.sheets.index(item[0][0]), item[0][1] or 0.0)
-        )
-    ]
+    def __init__(self, cases: SliceCases) -> None:
+        self.cases = cases
 
-
-class _Diagram:
-    """One unit square of a family: its cases, and what happens between them."""
-
-    def __init__(self, part: Slice, solve: Solve) -> None:
-        self.family, self.sheet, self.plane, self.placed = part
-        self.solve = solve
-        low, high = self.family.ranges[-1]
-        self.height = high - low  # of h/t
-
-    def case(self, u: Array | tuple[float, float]) -> Case:
-        """The case at a place, also a little outside of the square."""
-        x, y = (min(max(float(part), 0.0), 1.0) for part in u)
-        unit = (x, y) if self.plane is None else (x, self.plane, y)
-        return self.family.case(self.sheet, unit)
-
-    def boundaries(self) -> Boundaries:
+    def located(self) -> Boundaries:
         """All boundaries between the cases of a scan."""
         lines: list[Line] = []
-        crossings = crossings_of(self.placed)
+        crossings = crossings_of(self.cases.placed)
         for crossing in crossings:  # one after the other: a curve explains many
             if not _explained(crossing, lines):
                 self._trace(crossing, lines)
         kept, met = self._kept(lines)
         left = [crossing for crossing in crossings if not _explained(crossing, kept)]
         found = len(lines)
-        left = self._bisected(left, NARROW)
+        left = self.cases.bisected(left, NARROW)
         for narrow in left:
             # so close to the boundary the state that makes it is almost there
             if not _explained(narrow, kept):
@@ -186,12 +120,12 @@ class _Diagram:
         left = [narrow for narrow in left if not _explained(narrow, kept)]
         curves = [self._curve(line) for line in kept]
         points: dict[str, list[BoundaryPoint]] = defaultdict(list)
-        for narrow in self._bisected(left, BISECTED):
-            points[narrow.kind].append(self._between(narrow))
+        for narrow in self.cases.bisected(left, BISECTED):
+            points[narrow.kind].append(self.cases.between(narrow))
         curves += [
-            Curve(f"{kind} (bisected)", self.sheet, chain)
+            Curve(f"{kind} (bisected)", self.cases.sheet, chain)
             for kind, some in points.items()
-            for chain in self._chains(some)
+            for chain in self.cases.chains(some)
         ]
         return Boundaries(curves, [self._corner(one) for one in met])
 
@@ -215,7 +149,7 @@ class _Diagram:
             before = len(lines)
             ends = [end for end in _loose(kept, met) if distance(end, np.array(asked)) > BESIDE]
             asked += ends
-            for crossing in self._bisected(self._around(ends, kept), NEAREST):
+            for crossing in self.cases.bisected(self._around(ends, kept), NEAREST):
                 self._trace_all(crossing, lines)
             if len(lines) == before:
                 break
@@ -229,7 +163,7 @@ class _Diagram:
         found = []
         for end in ends:
             places = [(float(u[0]), float(u[1])) for u in np.clip(end + circle, 0.0, 1.0)]
-            rows = self.solve([self.case(u) for u in places])
+            rows = self.cases.solve([self.cases.case(u) for u in places])
             there = list(zip(places, rows, strict=True))
             for (a, first), (b, second) in pairwise([*there, there[0]]):
                 chord = np.array([a, b])
@@ -277,25 +211,26 @@ class _Diagram:
 
     def _scene(self, u: Array) -> Scene:
         """The scene at a place; derivatives by a state ask for the same one again."""
-        return _scene(self.case(u))
+        return _scene(self.cases.case(u))
 
     def _states(self) -> States[Value]:
         return States(lambda seed: across(self._scene, fresh(seed)), numbers)
 
     def _curve(self, line: Line) -> Curve:
+        height = self.cases.height
         points = [
-            self._point(at, self._error(line.kind, at) if met is None else self.height * met.error)
+            self._point(at, self._error(line.kind, at) if met is None else height * met.error)
             for at, met in zip(line.points, line.corners, strict=True)
         ]
-        return Curve(line.kind, self.sheet, tuple(points))
+        return Curve(line.kind, self.cases.sheet, tuple(points))
 
     def _corner(self, met: Met) -> Corner:
-        point = self._point(met.first, self.height * met.error)
-        return Corner(met.kinds, self.sheet, point)
+        point = self._point(met.first, self.cases.height * met.error)
+        return Corner(met.kinds, self.cases.sheet, point)
 
     def _point(self, at: At[Value], error: float) -> BoundaryPoint:
         state = at.state.at
-        return BoundaryPoint(self.case(at.u), state.gamma, state.moment, error)
+        return BoundaryPoint(self.cases.case(at.u), state.gamma, state.moment, error)
 
     def _error(self, kind: str, at: At[Value]) -> float:
         """Error of the place in h/t: what is left of the condition, and what halving changes."""
@@ -305,7 +240,7 @@ class _Diagram:
             change = self._condition(kind)(at.u, fine)[0] - state.value
         except ContinuationFailed:
             return math.inf
-        return self.height * (at.distance + abs(change) / float(np.linalg.norm(at.gradient)))
+        return self.cases.height * (at.distance + abs(change) / float(np.linalg.norm(at.gradient)))
 
     def _kept(self, lines: list[Line]) -> tuple[list[Line], list[Met]]:
         """Pieces of curves on whose two sides the modes differ by their kind, and their corners."""
@@ -333,7 +268,7 @@ class _Diagram:
     def _hold(self, lines: list[Line], asked: list[tuple[int, int]]) -> Iterator[bool | None]:
         """Whether the modes on the two sides of points differ; None where that is not to be had."""
         sides = [beside(lines[n], k, lines) for n, k in asked]
-        rows = iter(self.solve([self.case(u) for places in sides for u in places]))
+        rows = iter(self.cases.solve([self.cases.case(u) for places in sides for u in places]))
         for (n, _), places in zip(asked, sides, strict=True):
             yield _bounds(lines[n].kind, next(rows), next(rows)) if places else None
 
@@ -355,50 +290,6 @@ class _Diagram:
                 own.insert(k + added, None)
                 new.append((n, k + added))
         return new
-
-    # --- what only the label tells ---
-
-    def _bisected(self, crossings: list[Crossing], width: float) -> list[Crossing]:
-        """Two cases between each two, so close together, that differ likewise; in lockstep."""
-        while crossings and max(crossing.gap for crossing in crossings) > width:
-            middles = [crossing.middle for crossing in crossings]
-            rows = self.solve([self.case(middle) for middle in middles])
-            halves = [
-                crossing.halved((float(middle[0]), float(middle[1])), row)
-                for crossing, middle, row in zip(crossings, middles, rows, strict=True)
-            ]
-            crossings = [half for half in halves if half is not None]
-        return crossings
-
-    def _between(self, narrow: Crossing) -> BoundaryPoint:
-        """The place between two cases, with the last fold of the one that has any."""
-        row = narrow.first if narrow.first.folds else narrow.second
-        gamma = max(row.folds, default=math.nan)
-        error = self.height * narrow.gap
-        return BoundaryPoint(self.case(narrow.middle), gamma, math.nan, error)
-
-    def _chains(self, points: list[BoundaryPoint]) -> Iterator[tuple[BoundaryPoint, ...]]:
-        """Points in the order of their curves: each the nearest to the one before."""
-        left = [(np.array(self._place(p.case)), p) for p in points]
-        left.sort(key=lambda item: tuple(item[0]))
-        chain: list[tuple[Array, BoundaryPoint]] = []
-        while left:
-            if chain:
-                apart = [float(np.linalg.norm(u - chain[-1][0])) for u, _ in left]
-                k = int(np.argmin(apart))
-                if apart[k] > 3.0 / self.family.coarse:
-                    yield tuple(p for _, p in chain)
-                    chain = []
-                    continue
-                chain.append(left.pop(k))
-            else:
-                chain.append(left.pop(0))
-        if chain:
-            yield tuple(p for _, p in chain)
-
-    def _place(self, case: Case) -> tuple[float, float]:
-        unit = self.family.unit(case) or (0.0,) * self.family.dimension
-        return unit[0], unit[-1]
 
 
 @lru_cache(maxsize=16)

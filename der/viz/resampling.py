@@ -1,8 +1,8 @@
-"""Films that run evenly, and two of them in step: steps between the states of paths.
+"""Animations resampled to even motion, and two of them in step.
 
-A path has few states, close together where it bends: good for reading, not for watching. Here a
-film is cut anew, in steps of about equal motion. Between two equilibria the ring is drawn on a
-spline through its states (as the curves are, see `curve`), within falls on a straight line.
+A path has few states, close together where it bends: good for reading, not for watching. Here an
+motion is resampled in steps of about equal motion. Between two equilibria the ring is drawn on a
+spline through its states (as the curves are, see `curve`), within snaps on a straight line.
 """
 
 from __future__ import annotations
@@ -15,45 +15,67 @@ from numpy.typing import NDArray
 
 from der.records.path import Path
 from der.utils.checks import Array
-from der.viz.animation import Playback, playback
+from der.viz.animation import Motion, animate
 from der.viz.curve import chord_length, pieces, smooth
 
 PER = 16  # points of the drawn curve in an interval: the present state moves on these
-FINE = 240  # steps of each of two films before they are brought in step
+FINE = 240  # steps of each of two motions before they are brought in step
 _ROUND = 1e-9
 
 
-def evenly(path: Path, n: int) -> Playback:
-    """The film of a path in ``n`` steps of about equal motion; special points are kept besides."""
-    film = playback(path)
-    return between(path, film, _even(path, film, n))
+def resampled(path: Path, n: int) -> Motion:
+    """A path in ``n`` steps of about equal motion; special points are kept besides."""
+    motion = animate(path)
+    return between(path, motion, _even(path, motion, n))
 
 
-def in_step(paths: Sequence[Path], n: int) -> list[Playback]:
+def one_or_two(path: Path | Sequence[Path]) -> list[Path]:
+    """One path or two as a list.
+
+    Raises
+    ------
+    ValueError
+        If there are more, or none.
+    """
+    paths = [path] if isinstance(path, Path) else list(path)
+    if len(paths) not in (1, 2):
+        raise ValueError(f"path must be one or two, got {len(paths)}")
+    return paths
+
+
+def in_step(paths: Sequence[Path], n: int) -> list[Motion]:
     """Films of one or two paths in about ``n`` common steps, at equal gamma wherever there are any.
 
     Where one ring turns back in gamma or snaps, the other waits.
+
+    Raises
+    ------
+    ValueError
+        If ``n`` is below 2.
     """
+    if n < 2:
+        raise ValueError(f"frames must be at least 2, got {n!r}")
     if len(paths) == 1:
-        return [evenly(paths[0], n)]
-    films = [playback(path) for path in paths]
-    fine = [_even(path, film, FINE) for path, film in zip(paths, films, strict=True)]
+        return [resampled(paths[0], n)]
+    motions = [animate(path) for path in paths]
+    fine = [_even(path, motion, FINE) for path, motion in zip(paths, motions, strict=True)]
     gamma = [
-        between(path, film, at).gamma for path, film, at in zip(paths, films, fine, strict=True)
+        between(path, motion, at).gamma
+        for path, motion, at in zip(paths, motions, fine, strict=True)
     ]
-    pairs = together(*gamma)
+    pairs = aligned(*gamma)
     chosen = set(np.linspace(0, len(pairs) - 1, n).round().astype(int).tolist())
-    for k, (path, film) in enumerate(zip(paths, films, strict=True)):
-        for step in _kept(path, film):
+    for k, (path, motion) in enumerate(zip(paths, motions, strict=True)):
+        for step in _kept(path, motion):
             chosen.add(int(np.searchsorted(fine[k][pairs[:, k]], step - _ROUND)))
     rows = pairs[sorted(chosen)]
     return [
-        between(path, film, fine[k][rows[:, k]])
-        for k, (path, film) in enumerate(zip(paths, films, strict=True))
+        between(path, motion, fine[k][rows[:, k]])
+        for k, (path, motion) in enumerate(zip(paths, motions, strict=True))
     ]
 
 
-def together(one: Array, other: Array) -> NDArray[np.int64]:
+def aligned(one: Array, other: Array) -> NDArray[np.int64]:
     """Pairs (k, 2) of places in two sequences, each running forwards, as near as can be throughout.
 
     The least sum of differences, by dynamic programming (time warping); of equal ways the one on
@@ -75,38 +97,38 @@ def together(one: Array, other: Array) -> NDArray[np.int64]:
     return np.array(pairs[::-1], dtype=np.int64) - 1
 
 
-def between(path: Path, film: Playback, places: Array) -> Playback:
-    """The film at places between its steps, without modes.
+def between(path: Path, motion: Motion, places: Array) -> Motion:
+    """The motion at places between its steps, without modes.
 
     Parameters
     ----------
     places : (m,) ascending; 2.5 is in the middle between the steps 2 and 3. Where a snap has no
         history there is nothing between the two: the ring is shown before or after it.
     """
-    last = len(film.x) - 1
+    last = len(motion.x) - 1
     at = np.clip(np.asarray(places, dtype=float), 0.0, last)
     at = np.where(np.abs(at - at.round()) < _ROUND, at.round(), at)
-    landed = [film.step_of(p.position) for p in path.points if p.kind == "snap" and p.position]
+    landed = [motion.step_of(p.position) for p in path.points if p.kind == "snap" and p.position]
     for step in landed:
-        if film.position[step - 1] >= 0:  # no history
+        if motion.position[step - 1] >= 0:  # no history
             at = np.where((at > step - 1) & (at < step), (at + 0.5).astype(int), at)
     k = np.minimum(at.astype(int), max(last - 1, 0))
-    falling = (film.position[k] < 0) | (film.position[np.minimum(k + 1, last)] < 0)
-    n, n_v, _ = film.x.shape
-    density = np.moveaxis(film.density, 0, -1)
+    falling = (motion.position[k] < 0) | (motion.position[np.minimum(k + 1, last)] < 0)
+    n, n_v, _ = motion.x.shape
+    density = np.moveaxis(motion.density, 0, -1)
     flat = np.concatenate(
-        [film.x, film.frames.reshape(n, n_v, 9), density], axis=2
+        [motion.x, motion.frames.reshape(n, n_v, 9), density], axis=2
     )  # all that is drawn of a vertex
-    drawn = _splined(path, film, flat.reshape(n, -1), at).reshape(len(at), n_v, -1)
+    drawn = _splined(path, motion, flat.reshape(n, -1), at).reshape(len(at), n_v, -1)
     share = at - k
-    position = film.position[np.where(share == 1.0, np.minimum(k + 1, last), k)]
+    position = motion.position[np.where(share == 1.0, np.minimum(k + 1, last), k)]
     inside = falling & (position < 0) | falling & (share > 0.0) & (share < 1.0)
     return replace(
-        film,
+        motion,
         x=drawn[..., :3],
-        gamma=_on_curve(path, film, "gamma", at, inside),
-        moment=_on_curve(path, film, "moment", at, inside),
-        energy=_on_curve(path, film, "energy", at, inside),
+        gamma=_on_curve(path, motion, "gamma", at, inside),
+        moment=_on_curve(path, motion, "moment", at, inside),
+        energy=_on_curve(path, motion, "energy", at, inside),
         frames=_orthonormal(drawn[..., 3:12].reshape(len(at), n_v, 3, 3)),
         position=np.where(inside, -1, position),
         density=np.moveaxis(np.maximum(drawn[..., 12:], 0.0), -1, 0),
@@ -116,45 +138,45 @@ def between(path: Path, film: Playback, places: Array) -> Playback:
     )
 
 
-def _even(path: Path, film: Playback, n: int) -> Array:
-    """Places in the film at equal motion, half of the ring and half of its grips."""
-    if len(film.x) == 1:
+def _even(path: Path, motion: Motion, n: int) -> Array:
+    """Places in the motion at equal motion, half of the ring and half of its grips."""
+    if len(motion.x) == 1:
         return np.zeros(1)
-    moved = np.linalg.norm(np.diff(film.x, axis=0), axis=2).max(axis=1)
-    turned = np.abs(np.diff(film.gamma))
+    moved = np.linalg.norm(np.diff(motion.x, axis=0), axis=2).max(axis=1)
+    turned = np.abs(np.diff(motion.gamma))
     shares = [np.append(0.0, np.cumsum(v)) / (float(v.sum()) or 1.0) for v in (moved, turned)]
     way = shares[0] + shares[1]
-    steps = np.arange(len(film.x))
+    steps = np.arange(len(motion.x))
     rising = np.append(True, np.diff(way) > 0.0)
     places = np.interp(np.linspace(0.0, way[-1], n), way[rising], steps[rising])
-    return np.unique(np.concatenate([places, _kept(path, film)]))
+    return np.unique(np.concatenate([places, _kept(path, motion)]))
 
 
-def _kept(path: Path, film: Playback) -> list[float]:
+def _kept(path: Path, motion: Motion) -> list[float]:
     """Steps that are always shown: special points, and the last."""
-    return [*(float(film.step_of(p.position)) for p in path.points), len(film.x) - 1.0]
+    return [*(float(motion.step_of(p.position)) for p in path.points), len(motion.x) - 1.0]
 
 
-def _on_curve(path: Path, film: Playback, name: str, at: Array, inside: Array) -> Array:
-    """Values at places of the film: on the curve as it is drawn, within falls on their own."""
-    steps = np.arange(len(film.x))
-    known = film.position >= 0
+def _on_curve(path: Path, motion: Motion, name: str, at: Array, inside: Array) -> Array:
+    """Values at places of the motion: on the curve as it is drawn, within falls on their own."""
+    steps = np.arange(len(motion.x))
+    known = motion.position >= 0
     # a place in the path: the steps of a fall are none, their place is that of the state they leave
-    place = np.interp(at, steps[known], film.position[known].astype(float))
+    place = np.interp(at, steps[known], motion.position[known].astype(float))
     if len(path) == 1:
         values = np.repeat(getattr(path, name), len(at))
     else:
         column, height = (0, path.energy) if name == "gamma" else (1, getattr(path, name))
         curve = smooth(path, height, PER)[:, column] * (np.pi if name == "gamma" else 1.0)
         values = np.interp(place * PER, np.arange(len(curve)), curve)
-    own: Array = getattr(film, name)
+    own: Array = getattr(motion, name)
     falling = np.interp(at, steps, np.nan_to_num(own))
     if name == "moment":
         falling = np.full(len(at), np.nan)
     return np.where(inside, falling, values)
 
 
-def _splined(path: Path, film: Playback, values: Array, at: Array) -> Array:
+def _splined(path: Path, motion: Motion, values: Array, at: Array) -> Array:
     """Rows of values (n, m) at places: splines along the smooth pieces, straight within falls."""
     from scipy.interpolate import CubicSpline
 
@@ -166,7 +188,7 @@ def _splined(path: Path, film: Playback, values: Array, at: Array) -> Array:
         return out
     length = chord_length(path)  # as of the curve: else gamma would not be that of the grips
     for first, last in pieces(path):
-        a, b = film.step_of(first), film.step_of(last)
+        a, b = motion.step_of(first), motion.step_of(last)
         chord = length[first : last + 1]
         new = np.append(True, np.diff(chord) > 1e-5)
         if b - a < 2 or np.count_nonzero(new) < 3:

@@ -13,7 +13,7 @@ WIDE, HIGH = 150.0, 90.0  # in its own units
 DASH = 1.3  # of a dotted line, and the gap between two, in the same
 
 
-class Panel:
+class PlotAxes:
     """Where (gamma, value) is drawn: in a box WIDE by HIGH, of which y points down.
 
     Parameters

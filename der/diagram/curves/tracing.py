@@ -14,7 +14,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.diagram.conditions import NotFound
+from der.diagram.curves.conditions import NotFound
 from der.errors import ContinuationFailed
 
 T = TypeVar("T")
@@ -69,15 +69,19 @@ def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> At[T]
     raise NotFound("no point of the curve found")
 
 
+def by_differences(
+    f: Callable[[Array], Array | float],
+    u: Array,
+    value: Array | float,
+    size: Array | float = DIFFERENCE,
+) -> Array:
+    """Derivatives of ``f`` by ``u``, its last dimension, from differences towards the middle."""
+    steps = np.diag(np.where(u < 0.5, size, -size))
+    return np.array([(f(u + step) - value) / step.sum() for step in steps]).T
+
+
 def _gradient(f: Function[T], u: Array, value: float, state: T) -> Array:
-    """By differences, towards the middle of the square."""
-    out = np.empty(2)
-    for k in range(2):
-        h = DIFFERENCE if u[k] < 0.5 else -DIFFERENCE
-        step = np.zeros(2)
-        step[k] = h
-        out[k] = (f(u + step, state)[0] - value) / h
-    return out
+    return by_differences(lambda u: f(u, state)[0], u, value)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,170 @@
+"""Regions of a phase diagram as labels of pixels, from the labels of solved cases.
+
+Places are in unit coordinates, from 0 to 1 along both parameters of the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from der.utils.checks import Array
+
+Labels = NDArray[np.int64]
+
+NOT_FOLDABLE, STABLE, BACK, FAILED = 0, 2, 1, 5  # a foldable ring: 1 + STABLE + BACK, as they apply
+FINER = (4, 32)  # pixels between two nodes, at least and at most,
+PIXELS = 512  # and so many across
+BETWEEN = 6  # pieces of a line between two points of a boundary
+NEIGHBOURS = 64  # shown places that a hidden one is compared with
+UNSEEN = 10.0  # cells: places beyond a boundary count only where there are no others
+
+
+class Sheet(NamedTuple):
+    """The solved cases of one twisting axis, in one plane of a diagram."""
+
+    axis: str  # "x" or "y"
+    labels: Labels  # (n, n) at the nodes of a lattice: NOT_FOLDABLE, 1 to 4, or FAILED
+    slopes: Array  # (n, n) dM/dgamma at pi, interpolated within cells
+    beside: Array  # (m, 2) places of cases that are no nodes
+    beside_labels: Labels  # (m,)
+
+
+class Boundary(NamedTuple):
+    """A boundary between folding modes."""
+
+    kind: str  # with " (scan)" after it where it is as the scan sees it
+    axis: str
+    places: Array  # (n, 2) in order
+
+    @property
+    def line(self) -> Array:
+        """The places with more between them, on Akima's curve, which does not swing at a kink.
+
+        What was scanned is left as it is.
+        """
+        from scipy.interpolate import Akima1DInterpolator
+
+        steps = np.linalg.norm(np.diff(self.places, axis=0), axis=1)
+        places = self.places[np.append(True, steps > 1e-9 * steps.max(initial=0.0))]
+        if len(places) < 3 or self.kind.endswith(")"):
+            return places
+        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        along = np.append(0.0, np.cumsum(steps))
+        n = np.arange(BETWEEN * (len(places) - 1) + 1) / BETWEEN
+        at = np.interp(n, np.arange(len(along)), along)
+        return np.asarray(Akima1DInterpolator(along, places)(at))
+
+
+def pixels(sheet: Sheet, boundaries: Iterable[Boundary]) -> Labels:
+    """Labels (k, k) of pixels between the nodes of a sheet.
+
+    Where a boundary passes, the label is that of the nearest case on the same side. Elsewhere,
+    whether a ring is foldable and snaps back is what most of the neighbours do, weighted by
+    distance; whether it is stable is the sign of the slope at pi, interpolated.
+    """
+    labels = sheet.labels
+    n = len(labels)
+    finer = int(np.clip(PIXELS // (n - 1), *FINER))
+    place = (np.arange(finer * (n - 1)) + 0.5) / finer
+    weight = np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(n)))
+
+    def mean(values: Array | NDArray[np.bool_]) -> Array:
+        spread: Array = weight @ values.astype(float) @ weight.T
+        return spread
+
+    foldable = (labels > NOT_FOLDABLE) & (labels < FAILED)
+    back = foldable & ((labels - 1) % 2 == BACK)
+    stable = mean(np.where(foldable, sheet.slopes, 0.0)) > 0.0
+    snaps_back = mean(back) > 0.5 * mean(foldable)
+    found: Labels = 1 + np.where(stable, STABLE, 0) + np.where(snaps_back, BACK, 0)
+    parts = [mean(labels == NOT_FOLDABLE), mean(foldable), mean(labels == FAILED)]
+    winner = np.argmax(parts, axis=0)
+    found[winner == 0] = NOT_FOLDABLE
+    found[winner == 2] = FAILED
+    lines = [b.line * (n - 1) for b in boundaries if b.axis == sheet.axis and len(b.places) > 1]
+    _correct(found, sheet, _segments(lines))
+    return found
+
+
+def _segments(lines: Sequence[Array]) -> Array:
+    """The pieces (m, 2, 2) of lines."""
+    pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+    return np.concatenate([np.empty((0, 2, 2)), *pieces])
+
+
+def _correct(found: Labels, sheet: Sheet, segments: Array) -> None:
+    """Where labels differ within a cell, give each pixel the label of its side of a boundary.
+
+    Parameters
+    ----------
+    found : (k, k) labels of pixels, which are changed.
+    segments : (m, 2, 2) pieces of boundaries, in units of the lattice, as all places below.
+    """
+    labels, n = sheet.labels, len(sheet.labels) - 1
+    finer = len(found) // n
+    low, high = segments.min(axis=1), segments.max(axis=1)
+    inner = (np.arange(finer) + 0.5) / finer
+    offsets = np.stack(np.meshgrid(inner, inner, indexing="ij"), axis=-1).reshape(-1, 2)
+    steps = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
+    around = [labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]]
+    mixed = np.ptp(around, axis=0) > 0
+    beside = sheet.beside * n
+    homes = np.clip(beside.astype(np.int64), 0, n - 1)
+    mixed[tuple(homes[sheet.beside_labels != around[0][tuple(homes.T)]].T)] = True
+    for i, j in np.argwhere(mixed):
+        near = ((low <= (i + 1, j + 1)) & (high >= (i, j))).all(axis=1)
+        if not near.any():
+            continue
+        nodes = np.array((i, j)) + steps
+        own = (homes == (i, j)).all(axis=1)
+        cases = np.concatenate([nodes, beside[own]])
+        names = np.concatenate([labels[tuple(nodes.T)], sheet.beside_labels[own]])
+        block = found[i * finer : (i + 1) * finer, j * finer : (j + 1) * finer]
+        places = nodes[0] + offsets
+        block[...] = _on_sides(places, block.ravel(), cases, names, segments[near]).reshape(
+            block.shape
+        )
+
+
+def _on_sides(
+    places: Array, labels: Labels, cases: Array, names: Labels, segments: Array
+) -> Labels:
+    """Labels of places (k, 2): that of the nearest case which no segment hides.
+
+    Where segments hide all cases, the label is that of the nearest place which is not hidden.
+    """
+    from scipy.spatial import KDTree
+
+    far = np.linalg.norm(places[:, None] - cases, axis=2)
+    far[_crossed(places, cases, segments)] = np.inf
+    hidden = np.isinf(far.min(axis=1))
+    chosen: Labels = np.where(hidden, labels, names[np.argmin(far, axis=1)])
+    if hidden.any() and not hidden.all():
+        shown = places[~hidden]
+        far, near = KDTree(shown).query(places[hidden], range(1, min(NEIGHBOURS, len(shown)) + 1))
+        for row, place, others in zip(far, places[hidden], near, strict=True):
+            row[_crossed(place[None], shown[others], segments)[0]] += UNSEEN
+        best = near[np.arange(len(near)), np.argmin(far, axis=1)]
+        chosen[hidden] = chosen[~hidden][best]
+    return chosen
+
+
+def _crossed(places: Array, nodes: Array, segments: Array) -> NDArray[np.bool_]:
+    """Whether a segment lies between place and node, (places, nodes)."""
+    p, q = places[:, None, None], nodes[None, :, None]
+    a, b = segments[:, 0], segments[:, 1]
+    sides = _area(p, q, a) * _area(p, q, b) < 0.0
+    ends = _area(a, b, p) * _area(a, b, q) < 0.0
+    crossed: NDArray[np.bool_] = np.any(sides & ends, axis=2)
+    return crossed
+
+
+def _area(a: Array, b: Array, c: Array) -> Array:
+    """Twice the area of a triangle, positive where it is traversed to the left."""
+    u, v = b - a, c - a
+    area: Array = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    return area
