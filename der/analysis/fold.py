@@ -13,6 +13,7 @@ import numpy as np
 from der.analysis.path_record import (
     columns,
     full_shapes,
+    mesh_numerics,
     path_record,
     recorded_points,
     state_at_pi,
@@ -226,13 +227,7 @@ class _Found:
 
 
 def _numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:
-    return {
-        "n_edges": scene.n_edges,
-        "sector": ring.name,
-        "curvature": scene.curvature,
-        "stretch": scene.stretch,
-        "a_over_t": scene.a_over_t,
-        "tolerance": scene.tolerance,
+    return mesh_numerics(scene, ring) | {
         "gamma_max": scene.gamma_max,
         "until": scene.until,
         "control": scene.control,

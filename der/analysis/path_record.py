@@ -110,3 +110,15 @@ def state_at_pi(ring: GrippedRing, one: Point[Equilibrium], index_free: int | No
     index = total_index(ring, one.index)
     slope = ring.arm_moment(one.solution.slope)
     return AtPi(moment, slope, energy, index, moment_index(one, index), index_free)
+
+
+def mesh_numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:
+    """Return the numerical choices behind an answer, as they are recorded."""
+    return {
+        "n_edges": scene.n_edges,
+        "sector": ring.name,
+        "curvature": scene.curvature,
+        "stretch": scene.stretch,
+        "a_over_t": scene.a_over_t,
+        "tolerance": scene.tolerance,
+    }

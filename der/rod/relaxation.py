@@ -392,13 +392,20 @@ def relax(
     free = moment is not None
     aim = Aim(free, 0.0 if moment is None else moment, *stops, tolerance, most, every)
     end = _relax(rod, supports, aim, motion, pull, masses, album)
-    nothing = np.zeros(len(supports.target))
+    return _relaxed(
+        State(motion.quat, motion.stretch, pull.force, float(motion.load[0])), end, album
+    )
+
+
+def _relaxed(state: State, end: Ended, album: Album) -> Relaxed:
+    """What is known of a relaxation that has ended."""
+    nothing = np.zeros(len(state.force))
     history = tuple(
         State(album.quat[k].copy(), album.stretch[k].copy(), nothing, float(album.load[k]))
         for k in range(end.kept)
     )
     return Relaxed(
-        State(motion.quat, motion.stretch, pull.force, float(motion.load[0])),
+        state,
         Rest(end.outcome),
         end.where,
         end.evaluations,

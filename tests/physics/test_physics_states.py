@@ -175,7 +175,7 @@ def images_of(ring):
 
 
 def test_states_of_the_ring_at_h_over_t_2():
-    """Covers by their energies pi alpha (n - 1)^2 and indices; all at rest; all descents lower the energy."""
+    """Covers by energies pi alpha (n - 1)^2 and indices; at rest; descents lower the energy."""
     found, alpha = over_curvature.found, over_curvature.bar.alpha
     for name, n, index in (("flat", 1, 0), ("two-covered", 2, 0), ("three-covered", 3, 2)):
         assert found[name].energy == pytest.approx(math.pi * alpha * (n - 1) ** 2, abs=1e-10)

@@ -90,7 +90,7 @@ def test_index_is_zero_on_the_whole_path_at_h_over_t_4():
 
 
 def test_index_is_one_between_the_folds_at_h_over_t_1_6():
-    """The state that comes back in gamma is unstable in one way, those outside in none.
+    """States between the folds have one unstable mode, those outside none.
 
     Truth: the sign of the stiffness of the in-phase mode changes at a fold. Whole numbers.
     """

@@ -19,15 +19,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from der.analysis.landscape.landscape import FARTHEST, barriers, numerics, rest_of
+from der.analysis.landscape.landscape import bare_request, barriers, rest_of
 from der.analysis.landscape.rest_states import with_rests
 from der.analysis.landscape.saddle_search import climb, downhill_modes
-from der.analysis.request import Request, ring_of
+from der.analysis.path_record import mesh_numerics
+from der.analysis.request import ring_of
 from der.continuation.richardson import limits
 from der.errors import ContinuationFailed
 from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation_vector
-from der.problem import Options, Statistics
+from der.problem import Statistics
 from der.records.landscape import Barriers, Heights, Pass, Rest, Saddle
 from der.records.record import SolveTime
 from der.rod.dynamics import EndState, flow
@@ -104,7 +105,7 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
     return Pass(
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
-        numerics=numerics(scene, ring),
+        numerics=mesh_numerics(scene, ring),
         barriers=Heights(*heights),
         twisting=twisting,
         saddle=None if best is None else best.saddle,
@@ -121,10 +122,7 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
 def twisted_rests(scene: Scene) -> tuple[list[Rest], list[FreeRing], Barriers, str]:
     """Rests on the path of twisting, the same without grips, and why there is no pass."""
     ring, full = ring_of(scene), ring_of(scene, "full")
-    options = Options(tolerance=scene.tolerance, max_steps=600)
-    request = Request(FARTHEST, until_folded=True, stability=False, self_crossings=False)
-    request = replace(request, options=options)
-    statistics = Statistics()
+    request, statistics = bare_request(scene), Statistics()
     try:
         points = list(request.follow(ring, statistics))
         points, at = with_rests(ring, request, points, statistics)

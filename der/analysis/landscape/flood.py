@@ -50,13 +50,17 @@ class Flood:
 
     ring: GrippedRing
     supports: Supports
-    share: float  # of the grip distance that the sector spans
     gamma: Array
     distance: Array
     tolerance: float
     ceiling: float  # energy above which a cell has one minimum at most, its lowest
     minima: dict[Cell, list[Minimum]] = field(default_factory=dict)
     reasons: dict[Cell, str] = field(default_factory=dict)
+
+    @property
+    def share(self) -> float:
+        """Of the grip distance that the sector spans."""
+        return 0.5 if self.ring.name == "quarter" else 1.0
 
     def system(self, distance: float) -> RodSystem:
         """The rod with the grips at a distance."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from der.analysis.landscape.rest_states import with_rests
-from der.analysis.path_record import full_shapes, path_record
+from der.analysis.path_record import full_shapes, mesh_numerics, path_record
 from der.analysis.request import Request, ring_of
 from der.continuation.richardson import Extrapolated, limits
 from der.problem import Options, Point, Statistics, total_index
@@ -48,14 +48,8 @@ def landscape(
     are extrapolated, too.
     """
     ring = ring_of(scene)
-    request = Request(
-        gamma_max=FARTHEST,
-        until_folded=True,
-        targets=None if scene.save_at is None else tuple(scene.save_at),
-        stability=scene.stability,
-        self_crossings=False,
-        options=Options(tolerance=scene.tolerance, max_steps=_MOST_STEPS),
-    )
+    targets = None if scene.save_at is None else tuple(scene.save_at)
+    request = replace(bare_request(scene), targets=targets, stability=scene.stability)
     statistics = Statistics()
 
     def tell(one: Point[Equilibrium]) -> None:
@@ -78,6 +72,17 @@ def landscape(
     if not extrapolates:
         return found
     return _without_mesh(found, limits([_heights(one) for one in (found, *coarse)]))
+
+
+def bare_request(scene: Scene) -> Request:
+    """Return the path of twisting until the ring is folded, and nothing counted on it."""
+    return Request(
+        gamma_max=FARTHEST,
+        until_folded=True,
+        stability=False,
+        self_crossings=False,
+        options=Options(tolerance=scene.tolerance, max_steps=_MOST_STEPS),
+    )
 
 
 def _found(
@@ -106,7 +111,7 @@ def _found(
         points,
         run,
         statistics,
-        numerics=numerics(scene, ring),
+        numerics=mesh_numerics(scene, ring),
         shapes=full_shapes(scene, ring, points, modes=scene.modes) if scene.shapes else None,
     )
     return Landscape(path, rests, folded, barriers(rests, folded=folded, message=run.message))
@@ -187,15 +192,3 @@ def rest_of(
         distance=distance(ring, at),
         position=position,
     )
-
-
-def numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:
-    """The numerical choices behind an answer, as they are written."""
-    return {
-        "n_edges": scene.n_edges,
-        "sector": ring.name,
-        "curvature": scene.curvature,
-        "stretch": scene.stretch,
-        "a_over_t": scene.a_over_t,
-        "tolerance": scene.tolerance,
-    }

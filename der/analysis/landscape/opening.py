@@ -16,8 +16,8 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from der.analysis.landscape.barrier import barrier, twisted_rests
-from der.analysis.landscape.landscape import numerics
 from der.analysis.landscape.opening_search import Search, refine, scan
+from der.analysis.path_record import mesh_numerics
 from der.analysis.request import ring_of
 from der.continuation.richardson import Extrapolated, limits
 from der.records.landscape import Pass
@@ -82,7 +82,7 @@ def least_push(
         why=why,
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
-        numerics=numerics(scene, ring_of(scene, "full")) | {"points": grid},
+        numerics=mesh_numerics(scene, ring_of(scene, "full")) | {"points": grid},
         barrier=free.open,
         twisting=free.twisting.open,
         least=search.least(dead=False) if search is not None else {},

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from der.geometry.section import rectangular_section
 from der.records.landscape import BarrierCurves, Landscape, Pass
 from der.records.record import SolveTime
 from der.scene import Scene
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 _BARRIERS = ("fold", "open", "fold_free", "open_free")
 
@@ -34,7 +34,7 @@ def barriers_over(
 
     Parameters
     ----------
-    free : whether to look for the barriers of the ring left alone, too; takes ten times as long.
+    free : whether to look for the barriers of the free ring, too; takes ten times as long.
     error_bars : whether to extrapolate from N, N/2 and N/4 edges, and say how sure that is.
     progress : called with h/t after every landscape.
 
@@ -42,52 +42,51 @@ def barriers_over(
     -----
     Ctrl-C keeps the values so far.
     """
-    started = time.perf_counter()
-    rows: list[tuple[float, ...]] = []
-    indices: list[int | None] = []
-    why: list[str] = []
-    errors: list[tuple[float, ...]] = []
-    with interrupts_between_states() as pressed:
-        for value in map(float, h_over_t):
-            section = rectangular_section(value, nu)
-            scene = Scene(ring, section, n_edges=n_edges, stability=False, error_bars=error_bars)
-            one = landscape(scene)
-            sentences = set(one.barriers.why.values())
-            found = barrier(scene) if free else None
-            if found is not None:
-                sentences |= {found.why} - {""}
-            rows.append((value, *_twisting(one), *_alone(found)))
-            errors.append(
-                (
-                    *_errors(one.extrapolated),
-                    *_errors(found.extrapolated if found is not None else {}),
-                )
-            )
-            saddle = one.barriers.saddle
-            indices.append(None if saddle is None else one.rests[saddle].index_free)
-            why.append("; ".join(sorted(sentences)))
-            if progress is not None:
-                progress(value)
-            if pressed:
-                break
-    values, fold, opening, gamma, energy, fold_free, open_free = np.array(rows).reshape(-1, 7).T
+
+    def solved(value: float) -> _Row:
+        section = rectangular_section(value, nu)
+        scene = Scene(ring, section, n_edges=n_edges, stability=False, error_bars=error_bars)
+        return _Row.of(value, landscape(scene), barrier(scene) if free else None)
+
+    def tell(row: _Row) -> None:
+        if progress is not None:
+            progress(row.values[0])
+
+    with Run() as run:
+        rows = run.collect((solved(float(value)) for value in h_over_t), tell)
+    names = ("h_over_t", "fold", "open", "gamma", "folded_energy", "fold_free", "open_free")
+    columns = np.array([row.values for row in rows]).reshape(-1, len(names)).T
+    errors = np.array([row.errors for row in rows]).reshape(-1, len(_BARRIERS)).T
     return BarrierCurves(
         ring=ring.to_json(),
         numerics={"n_edges": n_edges, "nu": nu, "error_bars": error_bars},
-        h_over_t=values,
-        fold=fold,
-        open=opening,
-        gamma=gamma,
-        folded_energy=energy,
-        fold_free=fold_free,
-        open_free=open_free,
-        index_free=tuple(indices),
-        why=tuple(why),
-        error=dict(zip(_BARRIERS, np.array(errors).reshape(-1, 4).T, strict=True))
-        if error_bars
-        else {},
-        timing=SolveTime(time.perf_counter() - started),
+        **dict(zip(names, columns, strict=True)),
+        index_free=tuple(row.index_free for row in rows),
+        why=tuple(row.why for row in rows),
+        error=dict(zip(_BARRIERS, errors, strict=True)) if error_bars else {},
+        timing=SolveTime(run.seconds),
     )
+
+
+class _Row(NamedTuple):
+    """What is known at one h/t."""
+
+    values: tuple[float, ...]  # h/t, and the columns of the record
+    errors: tuple[float, ...]  # of `_BARRIERS`
+    index_free: int | None  # of the saddle, without grips
+    why: str
+
+    @classmethod
+    def of(cls, h_over_t: float, one: Landscape, free: Pass | None) -> _Row:
+        """The row of a landscape, and of the barrier of the free ring."""
+        sentences = set(one.barriers.why.values()) | ({free.why} - {""} if free else set())
+        saddle = one.barriers.saddle
+        return cls(
+            (h_over_t, *_twisting(one), *_free(free)),
+            (*_errors(one.extrapolated), *_errors(free.extrapolated if free else {})),
+            None if saddle is None else one.rests[saddle].index_free,
+            "; ".join(sorted(sentences)),
+        )
 
 
 def _twisting(one: Landscape) -> tuple[float, ...]:
@@ -101,8 +100,8 @@ def _twisting(one: Landscape) -> tuple[float, ...]:
     return _numbers(*known.values())
 
 
-def _alone(found: Pass | None) -> tuple[float, ...]:
-    """Barriers of the ring left alone, or NaN."""
+def _free(found: Pass | None) -> tuple[float, ...]:
+    """Barriers of the free ring, or NaN."""
     if found is None:
         return _numbers(None, None)
     known = {"fold": found.fold, "open": found.open}

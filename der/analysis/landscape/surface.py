@@ -20,14 +20,15 @@ from typing import Any
 import numpy as np
 
 from der.analysis.landscape.flood import Cell, Flood, shaken, spread
-from der.analysis.landscape.landscape import FARTHEST, distance, numerics
+from der.analysis.landscape.landscape import bare_request, distance
 from der.analysis.landscape.rest_states import with_rests
 from der.analysis.loading import follow_angle
+from der.analysis.path_record import mesh_numerics
 from der.analysis.request import Request, ring_of
 from der.analysis.snap import Landing
 from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array
-from der.problem import Options, Point, Statistics
+from der.problem import Point, Statistics
 from der.records.energy_surface import NoMinimum, Surface
 from der.records.record import SolveTime
 from der.rod.equilibrium import Equilibrium
@@ -79,51 +80,32 @@ def energy_surface(
     if ring.name == "full":
         raise ValueError("sector must be auto, half or quarter for a surface, got 'full'")
     angles = np.linspace(0.0, math.pi, shape[0]) if gamma is None else np.array(gamma, dtype=float)
-    request = Request(
-        gamma_max=FARTHEST,
-        until_folded=True,
-        targets=tuple(angles),
-        stability=False,
-        self_crossings=False,
-        options=Options(tolerance=scene.tolerance, max_steps=600),
-    )
+    request = replace(bare_request(scene), targets=tuple(angles))
     with Run() as run:
         points = run.collect(request.follow(ring))
         if run.status == "not converged":  # a surface around as much of the path as there is
             run.status, run.message = "done", f"the path of twisting: {run.message}"
         points, without_load = with_rests(ring, request, points, Statistics())
         line = np.array([_place(ring, one.solution) for one in points])
-        low, high = _range(scene, line[:, 1]) if distance_range is None else distance_range
-        if not low < high <= 0.5 * scene.ring.length:
-            raise ValueError(
-                f"distance_range must rise to at most half the ring's length, "
-                f"{0.5 * scene.ring.length:g}, got {(low, high)}"
-            )
-        flood = Flood(
-            ring,
-            _with_distance(ring),
-            0.5 if ring.name == "quarter" else 1.0,
-            angles,
-            np.linspace(low, high, shape[1]),
-            scene.tolerance,
-            _CEILING * float(line[:, 2].max()),
-        )
+        low, high = _range(scene, line[:, 1], distance_range)
+        distances = np.linspace(low, high, shape[1])
+        ceiling = _CEILING * float(line[:, 2].max())
+        flood = Flood(ring, _with_distance(ring), angles, distances, scene.tolerance, ceiling)
         spread(flood, _seeds(flood, points), run, progress)
         spread(flood, shaken(flood, _SHAKES), run, progress)
         snapped = _snaps(ring, request, float(angles[-1]), run) if snaps and run.done else ()
-    folds = line[[k for k, one in enumerate(points) if one.kind == "fold"]]
     return Surface(
         status=run.status,
         message=run.message,
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
-        numerics=numerics(scene, ring) | {"shape": list(shape), "ceiling": flood.ceiling},
+        numerics=mesh_numerics(scene, ring) | {"shape": list(shape), "ceiling": flood.ceiling},
         gamma=angles,
         distance=flood.distance,
         **_maps(flood),
         reasons=_reasons(flood, run.status),
         path=line,
-        folds=folds,
+        folds=line[[k for k, one in enumerate(points) if one.kind == "fold"]],
         rests=line[without_load],
         snaps=snapped,
         timing=SolveTime(run.seconds),
@@ -144,11 +126,20 @@ def _place(ring: GrippedRing, at: Equilibrium) -> tuple[float, float, float]:
     return at.parameter, distance(ring, at), ring.copies * at.energy
 
 
-def _range(scene: Scene, along_path: Array) -> tuple[float, float]:
+def _range(
+    scene: Scene, along_path: Array, given: tuple[float, float] | None
+) -> tuple[float, float]:
     """Distances to be looked at: those of the path with a margin, short of full stretch."""
+    longest = 0.5 * scene.ring.length
     low, high = float(along_path.min()), float(along_path.max())
     margin = _MARGIN * max(high - low, 0.2 * scene.ring.length / math.pi)
-    return low - margin, min(high + margin, STRETCHED * 0.5 * scene.ring.length)
+    low, high = given or (low - margin, min(high + margin, STRETCHED * longest))
+    if not low < high <= longest:
+        raise ValueError(
+            f"distance_range must rise to at most half the ring's length, {longest:g},"
+            f" got {(low, high)}"
+        )
+    return low, high
 
 
 def _seeds(flood: Flood, points: Sequence[Point[Equilibrium]]) -> Iterator[tuple[Cell, State]]:

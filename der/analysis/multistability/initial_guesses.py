@@ -18,17 +18,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from der.analysis.landscape.barrier import twisted_rests
-from der.analysis.landscape.landscape import FARTHEST
+from der.analysis.landscape.landscape import bare_request
 from der.analysis.landscape.saddle_search import displaced
-from der.analysis.request import Request, ring_of
+from der.analysis.request import ring_of
 from der.continuation.roots import find_root
 from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array, turned
-from der.problem import Options
 from der.rod.free_ring import FreeRing, balance, released
 from der.rod.gripped_ring import GrippedRing
 from der.scene import Scene
@@ -64,14 +64,8 @@ def gripped_starts(scene: Scene, full: GrippedRing, gamma: float) -> Iterator[Fr
     """
     ring = ring_of(scene)
     other = 2.0 * math.pi - gamma
-    request = Request(
-        gamma_max=FARTHEST,
-        until_folded=max(gamma, other) <= math.pi,
-        targets=(gamma, other),
-        stability=False,
-        self_crossings=False,
-        options=Options(tolerance=scene.tolerance, max_steps=600),
-    )
+    until_folded = max(gamma, other) <= math.pi
+    request = replace(bare_request(scene), until_folded=until_folded, targets=(gamma, other))
     try:
         for one in request.follow(ring):
             state = one.solution.state

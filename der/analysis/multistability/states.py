@@ -16,13 +16,13 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from der.analysis.landscape.landscape import numerics
 from der.analysis.landscape.saddle_search import displaced
 from der.analysis.multistability.deflation import Known, deflated, recognised
 from der.analysis.multistability.descriptors import described, names
 from der.analysis.multistability.initial_guesses import free_starts, gripped_starts
 from der.analysis.multistability.symmetry_images import Images, images
 from der.analysis.multistability.transitions import Descent, descents
+from der.analysis.path_record import mesh_numerics
 from der.analysis.request import ring_of
 from der.errors import Reason
 from der.kernels.linking import vertices
@@ -202,7 +202,7 @@ def record(scene: Scene, full: GrippedRing, search: Search, gamma: float | None)
         released = search.known[start].energy - fall.rests[-1].energy if fall.ended else None
         way = Transition(name[start], end, fall.stiffness, fall.sign, via, released)
         transitions.append((order.index(start), way))
-    about = {**numerics(scene, full), "count": search.count}
+    about = {**mesh_numerics(scene, full), "count": search.count}
     return States(
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
