@@ -35,7 +35,7 @@ from der.rod.dynamics import EndState, flow
 from der.rod.free_ring import FreeRing, released
 from der.rod.rod import State
 from der.scene import Scene, meshes
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 _KICK = 0.05  # rad, root mean square: off a saddle of higher index, along a mode that leads down
 _NUDGE = 0.02  # rad, likewise: off a saddle of index 1, on to one of its two sides
@@ -65,18 +65,18 @@ def barrier(scene: Scene) -> Pass:
     Where there is none, ``why`` says so in a sentence. With the scene's ``error_bars`` its barriers
     are extrapolated, too. Ctrl-C keeps the saddles found so far.
     """
-    with interrupts_between_states() as pressed:
-        one = _pass(scene, pressed)
+    with Run() as run:
+        one = _pass(scene, run)
         if scene.error_bars and one.fold is not None:
             coarser = meshes(scene.n_edges, str(one.numerics["sector"]))[1:]
-            coarse = [_pass(replace(scene, n_edges=n, error_bars=False), pressed) for n in coarser]
-            if not pressed:
+            coarse = [_pass(replace(scene, n_edges=n, error_bars=False), run) for n in coarser]
+            if not run.pressed:
                 heights = [{"fold": level.fold, "open": level.open} for level in (one, *coarse)]
                 one = replace(one, extrapolated=limits(heights))
     return one
 
 
-def _pass(scene: Scene, pressed: list[int]) -> Pass:
+def _pass(scene: Scene, run: Run) -> Pass:
     """The lowest way found on one mesh."""
     started = time.perf_counter()
     rests, free, twisting, why = twisted_rests(scene)
@@ -88,9 +88,9 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
             index = "unknown" if end.index_free is None else str(end.index_free)
             why = f"the free folded ring is no well; its index is {index}"
         else:
-            found = _passes(rests, free, twisting, ends, pressed)
+            found = _passes(rests, free, twisting, ends, run)
     across = [one for one in found if set(one.saddle.ends) == {"flat", "folded"}]
-    if pressed and not why:
+    if run.pressed and not why:
         why = "stopped by the user before all saddles were looked for"
     if not why and not across:
         why = "no saddle was found between the flat and the folded ring"
@@ -112,7 +112,7 @@ def _pass(scene: Scene, pressed: list[int]) -> Pass:
         saddles=tuple(one.saddle for one in found),
         way=way,
         why=why,
-        status="interrupted" if pressed else "done" if rests else "not converged",
+        status="interrupted" if run.pressed else "done" if rests else "not converged",
         extrapolated={},
         timing=SolveTime(time.perf_counter() - started),
         shapes=shapes,
@@ -141,13 +141,13 @@ def _passes(
     free: list[FreeRing],
     twisting: Barriers,
     ends: dict[str, float],
-    pressed: list[int],
+    run: Run,
 ) -> list[_Found]:
     """Saddles of index 1 from all starts, each once, lowest first."""
     found: list[_Found] = []
     alike = ALIKE * abs(ends["folded"])
     for candidate, twisted in _candidates(rests, free, twisting):
-        if pressed:
+        if run.pressed:
             break
         energy = _energy(candidate)
         if any(abs(one.saddle.energy - energy) < alike for one in found):

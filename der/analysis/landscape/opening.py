@@ -9,7 +9,6 @@ can be, whatever else was tried.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 
@@ -25,7 +24,7 @@ from der.records.opening import LeastPush
 from der.records.record import SolveTime
 from der.scene import Scene, meshes
 from der.utils.checks import Array
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 _GRIDS = (24, 16, 12, 8)  # points on the ring: the first that divides the edges
 _NOT_WORTH = (3.0, 1.1)  # times the free barrier, or that of twisting: more is not followed
@@ -60,25 +59,24 @@ def least_push(
     ``error_bars`` works are extrapolated, too; the search then stays on points of the coarsest
     mesh. Ctrl-C keeps the pushes found so far.
     """
-    started = time.perf_counter()
     grid = _grid(scene, points)
-    with interrupts_between_states() as pressed:
+    with Run() as run:
         free = barrier(replace(scene, error_bars=False))
         search, why = _begun(scene, free)
         status = free.status
-        if search is not None and not pressed:
-            scan(search, grid, pressed, progress)
+        if search is not None and not run.pressed:
+            scan(search, grid, run, progress)
             if between:
-                refine(search, scene.n_edges // grid, free.open, pressed)
+                refine(search, scene.n_edges // grid, free.open, run)
         sure: Extrapolated = {}
-        if search is not None and scene.error_bars and not pressed:
+        if search is not None and scene.error_bars and not run.pressed:
             sure = _without_mesh(search, free)
     if search is not None and not why and not any(push.opens for push, _ in search.all):
         why = "no push was found that opens the ring"
-    if pressed:
+    if run.pressed:
         why = "stopped by the user before all pairs of points were tried"
     return LeastPush(
-        status="interrupted" if pressed else status,
+        status="interrupted" if run.pressed else status,
         why=why,
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
@@ -89,7 +87,7 @@ def least_push(
         least_dead=search.least(dead=True) if search is not None else {},
         extrapolated=sure,
         pushes=tuple(push for push, _ in search.all) if search is not None else (),
-        timing=SolveTime(time.perf_counter() - started),
+        timing=SolveTime(run.seconds),
         shapes=_shapes(search) if search is not None else {},
     )
 

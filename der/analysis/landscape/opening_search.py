@@ -20,6 +20,7 @@ from der.records.opening import ALIKE as TIE
 from der.records.opening import KINDS, Instant, Push, least_of
 from der.rod.free_ring import FreeRing
 from der.scene import Scene
+from der.utils.run import Run
 
 _UNIFORM = 1e-9  # of cells and natural strains that are alike
 _COARSER = 4  # a point that stands on a mesh of N/4 edges, too, as error bars need it
@@ -66,13 +67,11 @@ class Search:
         return {kind: k for kind, k in places.items() if k is not None}
 
 
-def scan(
-    search: Search, grid: int, pressed: list[int], progress: Callable[[float], object] | None
-) -> None:
+def scan(search: Search, grid: int, run: Run, progress: Callable[[float], object] | None) -> None:
     """Try all actuators at the pairs of a grid; ``progress`` is told the share that is done."""
     pairs = list(_pairs(search, grid))
     for k, pair in enumerate(pairs):
-        if pressed:
+        if run.pressed:
             return
         search.at(pair)
         if progress is not None:
@@ -103,7 +102,7 @@ def same_pair(search: Search, pair: Pair) -> Pair:
     return first, second
 
 
-def refine(search: Search, stride: int, barrier: float | None, pressed: list[int]) -> None:
+def refine(search: Search, stride: int, barrier: float | None, run: Run) -> None:
     """Go on between the points of the grid, around the best of each kind.
 
     A slow push that takes no more than the barrier cannot be bettered.
@@ -113,7 +112,7 @@ def refine(search: Search, stride: int, barrier: float | None, pressed: list[int
         stride //= 2
         for dead in (False, True):
             for kind in KINDS:
-                _descend(search, kind, stride, barrier, pressed, dead=dead)
+                _descend(search, kind, stride, barrier, run, dead=dead)
 
 
 def _descend(
@@ -121,13 +120,13 @@ def _descend(
     kind: str,
     stride: int,
     barrier: float | None,
-    pressed: list[int],
+    run: Run,
     *,
     dead: bool,
 ) -> None:
     """From the best push of a kind to one next to it that is better, until there is none."""
     before = None
-    while not pressed:
+    while not run.pressed:
         best = search.least(dead=dead).get(kind)
         if best is None or best == before:
             return
