@@ -19,31 +19,33 @@ from der.viz.rerun.axes import HIGH, WIDE
 
 UNDER = ("first", "second")  # where two motions that are beside each other put their sent
 SOLVING = "solving"  # entity and timeline of the states as they are found
-FPS, FILM = 30.0, 10.0  # frames a second at most; seconds that a motion of fewer states lasts
+FPS, LASTS = 30.0, 10.0  # frames a second at most; seconds that a motion of fewer states lasts
 CAMERA = np.array([3.1, 1.75, 1.3])  # from the middle, over the mean radius; the ring lies in y, z
-PAPER, NIGHT = (243, 243, 240), (13, 16, 17)  # of the ring's views; of panels, as labels' boxes
+PAPER, NIGHT = (243, 243, 240), (13, 16, 17)  # of the ring's views; of axes, as labels' boxes
 
 
 def while_solving() -> rrb.Blueprint:
-    """The last state that was found, until there is a motion."""
+    """The last state that was found, until the path is known."""
     view = rrb.Spatial3DView(origin=SOLVING, name="solving", background=PAPER, line_grid=False)
     panel = rrb.TimePanel(timeline=SOLVING, play_state="following", state="collapsed")
     return rrb.Blueprint(view, panel, *_aside())
 
 
 def layout(motion: Motion) -> rrb.Blueprint:
-    """The ring on the left, once for each energy; curves, series and words on the right."""
+    """The ring on the left, once for each energy; curves, series and texts on the right."""
     n = len(motion.x)
     curves = rrb.Horizontal(
         _curve_view("moment", "M a/GJ over gamma"), _curve_view("energy", "U a/GJ over gamma")
     )
-    right = rrb.Vertical(curves, _series(n), _states(n), _words(), row_shares=[4, 3, 1.7, 3])
-    whole = rrb.Horizontal(_ring_and_key(motion), right, column_shares=[1.05, 1])
-    return rrb.Blueprint(whole, _time(n), *_aside())
+    right = rrb.Vertical(
+        curves, _series(n), _states(n), _log_and_about(), row_shares=[4, 3, 1.7, 3]
+    )
+    everything = rrb.Horizontal(_ring_and_key(motion), right, column_shares=[1.05, 1])
+    return rrb.Blueprint(everything, _time(n), *_aside())
 
 
 def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
-    """Two rings beside each other above; the curves of both, and words, below."""
+    """Two rings beside each other above; the curves of both, and texts, below."""
     n = len(motions[0].x)
     size = max(motion.size for motion in motions)
     rings = [
@@ -65,7 +67,7 @@ def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
             origin="/",
             contents=[f"/{under}/series/{name}" for under in UNDER],
             name=title,
-            axis_x=rrb.TimeAxis(view_range=_whole(n)),
+            axis_x=rrb.TimeAxis(view_range=_steps(n)),
             plot_legend=rrb.PlotLegend(visible=True),
         )
         for name, title in (("gamma", "gamma over steps"), ("index", "index over steps"))
@@ -76,9 +78,9 @@ def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
         name="events",
         columns=rrb.TextLogColumns(text_log_columns=[TextLogColumn(TextLogColumnKind.Body)]),
     )
-    words = rrb.Horizontal(log, rrb.TextDocumentView(origin="about", name="about"))
+    texts = rrb.Horizontal(log, rrb.TextDocumentView(origin="about", name="about"))
     above = rrb.Vertical(rrb.Horizontal(*rings), _key(), row_shares=[9, 1])
-    right = rrb.Vertical(*curves, rrb.Horizontal(*series), words, row_shares=[3, 3, 2, 2.2])
+    right = rrb.Vertical(*curves, rrb.Horizontal(*series), texts, row_shares=[3, 3, 2, 2.2])
     return rrb.Blueprint(rrb.Horizontal(above, right, column_shares=[1.35, 1]), _time(n), *_aside())
 
 
@@ -86,7 +88,7 @@ def landscape_layout(motion: Motion, *, well: bool, surface: bool) -> rrb.Bluepr
     """The ring on the left; on the right the landscape, in one dimension or in both."""
     n = len(motion.x)
     bounds = _bounds(-24, WIDE + 26, -HIGH - 10, 14)
-    whole = rrb.Spatial2DView(
+    all_of_it = rrb.Spatial2DView(
         origin="landscape/whole",
         name="energy landscape, U a/GJ over gamma",
         background=NIGHT,
@@ -98,10 +100,10 @@ def landscape_layout(motion: Motion, *, well: bool, surface: bool) -> rrb.Bluepr
         background=NIGHT,
         visual_bounds=_bounds(-26, WIDE + 14, -HIGH - 10, 14),
     )
-    panels = rrb.Horizontal(whole, part) if well else whole
-    words = rrb.Horizontal(_words(), _series_view(n, "M and gamma", ["moment", "gamma"]))
+    curves = rrb.Horizontal(all_of_it, part) if well else all_of_it
+    texts = rrb.Horizontal(_log_and_about(), _series_view(n, "M and gamma", ["moment", "gamma"]))
     if not surface:
-        right = rrb.Vertical(panels, _states(n), words, row_shares=[5, 1.2, 3])
+        right = rrb.Vertical(curves, _states(n), texts, row_shares=[5, 1.2, 3])
         left = _ring_and_key(motion)
         return rrb.Blueprint(
             rrb.Horizontal(left, right, column_shares=[1, 1.25]), _time(n), *_aside()
@@ -122,7 +124,7 @@ def landscape_layout(motion: Motion, *, well: bool, surface: bool) -> rrb.Bluepr
     views = rrb.Horizontal(_ring_view("bending", motion), relief, column_shares=[1, 1.5])
     above = rrb.Vertical(views, _key(), row_shares=[7, 1])
     return rrb.Blueprint(
-        rrb.Vertical(above, rrb.Horizontal(panels, words), row_shares=[2, 1]), _time(n), *_aside()
+        rrb.Vertical(above, rrb.Horizontal(curves, texts), row_shares=[2, 1]), _time(n), *_aside()
     )
 
 
@@ -150,11 +152,11 @@ def _states(n: int) -> rrb.StateTimelineView:
     return rrb.StateTimelineView(
         origin="states",
         name="stability, last event",
-        time_view=rrb.TimeAxis(view_range=_whole(n)),
+        time_view=rrb.TimeAxis(view_range=_steps(n)),
     )
 
 
-def _words() -> rrb.Horizontal:
+def _log_and_about() -> rrb.Horizontal:
     """The log of events, and the parameters."""
     return rrb.Horizontal(
         rrb.TextLogView(
@@ -169,7 +171,7 @@ def _words() -> rrb.Horizontal:
 def _time(n: int) -> rrb.TimePanel:
     return rrb.TimePanel(
         timeline="step",
-        fps=min(FPS, max(1.0, n / FILM)),
+        fps=min(FPS, max(1.0, n / LASTS)),
         loop_mode="all",
         play_state="paused",
         state="collapsed",
@@ -242,7 +244,7 @@ def _series_view(n: int, title: str, series: Sequence[str]) -> rrb.TimeSeriesVie
         origin="series",
         contents=[f"$origin/{name}" for name in series],
         name=title,
-        axis_x=rrb.TimeAxis(view_range=_whole(n)),
+        axis_x=rrb.TimeAxis(view_range=_steps(n)),
         plot_legend=rrb.PlotLegend(visible=True),
     )
 
@@ -251,7 +253,7 @@ def _bounds(left: float, right: float, top: float, bottom: float) -> rrb.VisualB
     return rrb.VisualBounds2D(x_range=[left, right], y_range=[top, bottom])
 
 
-def _whole(n: int) -> rr.TimeRange:
+def _steps(n: int) -> rr.TimeRange:
     """All steps of a motion."""
     first, last = (rr.TimeRangeBoundary.absolute(seq=k) for k in (0, n - 1))
     return rr.TimeRange(start=first, end=last)
