@@ -35,7 +35,7 @@ class Workers(Protocol):
         """Replace an executor that broke."""
 
     def close(self) -> None:
-        """Let them go, their work done."""
+        """End them once their work is done."""
 
     def stop(self) -> None:
         """End at once; tasks in flight are lost."""
@@ -93,7 +93,7 @@ class Processes:
         self.executor = self._pool()
 
     def close(self) -> None:
-        """Let them go, their work done."""
+        """End them once their work is done."""
         self.executor.shutdown()
 
     def stop(self) -> None:
