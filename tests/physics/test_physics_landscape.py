@@ -344,7 +344,7 @@ def test_forces_are_the_slopes_of_the_surface():
 def test_the_path_runs_where_no_axial_force_acts():
     """Between cells where F changes its sign there is a state of the path, and none elsewhere."""
     one = sheet(der.circle(), 4.0, 24)
-    gamma, distance, _ = one.path
+    gamma, distance, _ = one.path.T
     for i in range(1, len(one.gamma) - 1):
         (places,) = np.nonzero(one.force[i, :-1] * one.force[i, 1:] < 0.0)
         on_path = distance[gamma == one.gamma[i]]
@@ -355,7 +355,7 @@ def test_the_path_runs_where_no_axial_force_acts():
 def test_a_stable_state_of_the_path_is_a_valley_of_the_surface():
     """No cell at its gamma has less energy, but for the cell's own size."""
     one = sheet(der.circle(), 4.0, 24)
-    gamma, _, energy = one.path
+    gamma, _, energy = one.path.T
     for i, here in enumerate(one.gamma):
         least = np.nanmin(one.energy[i])
         assert energy[gamma == here][0] <= least + 1e-9
