@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -75,38 +76,42 @@ def send_curve(
         axes = PlotAxes(path.gamma, heights)
         send_axes(sent, entity, axes)
     pieces = [
-        (side, piece)
-        for side, line in stretches(path, heights)
+        (kind, piece)
+        for kind, line in stretches(path, heights)
         for piece in axes.inside(axes.place(math.pi * line[:, 0], line[:, 1]))
     ]
-    for key, (label, own, width) in STRETCHES.items():
-        strips = [piece for side, piece in pieces if side is key]
-        if key is SNAP or (key is False and colour is not None):
-            strips = [dash for strip in strips for dash in dotted(strip)]
-        if strips:
-            lines = rr.LineStrips2D(strips, colors=colour or own, radii=width)
-            sent.still(f"{entity}/{label}", lines)
+    _send_stretches(sent, pieces, entity, colour)
     at = [point.position for point in path.points]
     if at:
         labels = np.array([POINTS[point.kind] for point in path.points])
         places = axes.place(path.gamma[at], heights[at])
         shown = axes.holds(places)
-        marks = rr.Points2D(
-            places[shown],
-            colors=ORANGE,
-            radii=1.3,
-            labels=labels[shown].tolist(),
-            show_labels=False,
-        )
+        look: dict[str, Any] = {"colors": ORANGE, "radii": 1.3, "show_labels": False}
+        marks = rr.Points2D(places[shown], labels=labels[shown].tolist(), **look)
         sent.still(f"{entity}/points", marks)
     values: Array = getattr(motion, name)
     places = axes.place(motion.gamma, values)
     known = np.isfinite(values) & axes.holds(places)
-    dots = places[known]
     shade, size = (colour, 3.2) if colour else ((255, 255, 255), 2.4)
     sent.still(f"{entity}/now", rr.Points2D.from_fields(colors=shade, radii=size, draw_order=50.0))
-    columns = rr.Points2D.columns(positions=dots.astype(np.float32))
+    columns = rr.Points2D.columns(positions=places[known].astype(np.float32))
     sent.run(f"{entity}/now", columns.partition(known.astype(int)))
+
+
+def _send_stretches(
+    sent: Entities,
+    pieces: Sequence[tuple[bool | str | None, Array]],
+    entity: str,
+    colour: Colour | None,
+) -> None:
+    """The curve by its stability; dotted where the ring snaps, or is unstable in one colour."""
+    for key, (label, own, width) in STRETCHES.items():
+        strips = [piece for kind, piece in pieces if kind is key]
+        if key is SNAP or (key is False and colour is not None):
+            strips = [dash for strip in strips for dash in dotted(strip)]
+        if strips:
+            lines = rr.LineStrips2D(strips, colors=colour or own, radii=width)
+            sent.still(f"{entity}/{label}", lines)
 
 
 def send_series(
