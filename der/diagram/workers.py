@@ -164,7 +164,7 @@ def processes(number: int | None) -> int:
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
     if isinstance(number, bool) or not isinstance(number, int) or number < 1:
-        raise ValueError(f"workers must be a whole number from 1, got {number!r}")
+        raise ValueError(f"workers must be an integer from 1, got {number!r}")
     return number
 
 

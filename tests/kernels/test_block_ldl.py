@@ -453,7 +453,7 @@ def test_augmented_system_at_a_fold(n, m, refined, error):
 
 @pytest.mark.parametrize("refined", [False, True], ids=["plain", "refined"])
 def test_augmented_system_at_an_exact_fold(refined):
-    """K singular to the last digit, from whole numbers; small and tame: 1e-13."""
+    """K singular to the last digit, from integers; small and tame: 1e-13."""
     matrix = (
         np.array([[[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 2.0]], np.diag([-1.0, 3.0, 2.0])]),
         np.zeros((2, 3, 3)),

@@ -56,7 +56,7 @@ def covered_index(n, alpha, beta, kappa0):
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 @pytest.mark.parametrize("kappa0", [-1.0, 0.5, 1.0, 2.0, 3.0])
 def test_index_of_covered_circles(n, kappa0):
-    """The index is a whole number: at 96 edges it is that of the continuum, away from thresholds.
+    """The index is an integer: at 96 edges it is that of the continuum, away from thresholds.
 
     Fourier modes of the second variation, see `covered_index`. The indices reach from 0 to 19.
     """
@@ -226,7 +226,7 @@ def test_holding_the_moment_adds_one_where_the_slope_is_negative():
     """Index with M held = index with gamma held + [dM/dgamma < 0].
 
     A Schur complement: the load as one more unknown adds an eigenvalue of the sign of dM/dgamma.
-    Along h/t = 1.6 and around both its folds, where gamma runs back; whole numbers, from dense
+    Along h/t = 1.6 and around both its folds, where gamma runs back; integers, from dense
     matrices of the full ring.
     """
     bar = rectangular_section(1.6)

@@ -80,7 +80,7 @@ def load_rate(piece: Sector, modes: SymmetryClass, visit: Visit, w: np.ndarray) 
 def test_index_is_zero_on_the_whole_path_at_h_over_t_4():
     """The index of the full ring is 0 from flat to folded: no fold, no branch, a stable ring.
 
-    A whole number, known at every state.
+    An integer, known at every state.
     """
     found = path(4.0, 64)
     assert not np.ma.getmaskarray(found.index).any()
@@ -90,7 +90,7 @@ def test_index_is_zero_on_the_whole_path_at_h_over_t_4():
 def test_index_is_one_between_the_folds_at_h_over_t_1_6():
     """The state that comes back in gamma is unstable in one way, those outside in none.
 
-    Truth: the sign of the stiffness of the in-phase mode changes at a fold. Whole numbers.
+    Truth: the sign of the stiffness of the in-phase mode changes at a fold. Integers.
     """
     found = path(1.6, 64)
     first, second = (point.position for point in found.folds)
@@ -107,7 +107,7 @@ def test_indices_beyond_pi(n_edges):
     """At h/t = 1 the index runs 0, 1, 3, 1, 3, 2 until folded, by two folds and three pairs.
 
     Truth: modes odd under an arm's own half-turn come in exact pairs; the folded ring has index 2
-    here (n-covered circle: 4 with the grips removed). Whole numbers.
+    here (n-covered circle: 4 with the grips removed). Integers.
     """
     found = path(1.0, n_edges)
     assert changes(found) == [
