@@ -247,5 +247,5 @@ def meshes(n_edges: int, sector: str) -> tuple[int, int, int]:
 
 def _whole(name: str, value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise ValueError(f"{name} must be a whole number, got {shown(value)}")
+        raise ValueError(f"{name} must be an integer, got {shown(value)}")
     return int(value)

@@ -99,7 +99,7 @@ def test_words_must_be_given(name):
 @pytest.mark.parametrize("value", [64.0, "64", True, None, math.nan])
 def test_edges_are_a_whole_number(value):
     """Not a float that happens to be whole."""
-    with pytest.raises(ValueError, match=r"^n_edges must be a whole number, got "):
+    with pytest.raises(ValueError, match=r"^n_edges must be an integer, got "):
         scene(n_edges=value)
 
 

@@ -111,27 +111,14 @@ class Collocation:
         tolerance: float = CLOSE,
     ) -> Solution | Failure:
         """The solution beside ``guess``: at its gamma, or in the plane across ``along``."""
-        piece = self.sector.piece
         frames, p = guess.frames.copy(), guess.p.copy()
         n, m = mesh.rest.shape
         nodes, places = np.empty((n + 1, 4)), np.empty((n + 1, 3))
         tangent, tangent_p = np.empty((n, m, 4)), np.empty(len(p))
+        problem = (*self.sector.piece, mesh.h, mesh.rest, frames, p, guess.gamma)
+        wanted = (along.frames, along.gamma, by_gamma, iterations, tolerance)
         status, done, gamma, tangent_gamma, rate, orientation, moment, energy = correct(
-            *piece,
-            mesh.h,
-            mesh.rest,
-            frames,
-            p,
-            guess.gamma,
-            along.frames,
-            along.gamma,
-            by_gamma,
-            iterations,
-            tolerance,
-            nodes,
-            places,
-            tangent,
-            tangent_p,
+            *problem, *wanted, nodes, places, tangent, tangent_p
         )
         if status != CONVERGED and not (status == SLOW and tolerance == 0.0):
             return Failure(REASONS[status], done)

@@ -99,5 +99,5 @@ def _checked_count(n: object) -> int:
     except TypeError:
         count = 0
     if isinstance(n, bool) or count < 12 or count % 2:
-        raise ValueError(f"n must be an even whole number >= 12, got {n!r}")
+        raise ValueError(f"n must be an even integer >= 12, got {n!r}")
     return count

@@ -71,7 +71,7 @@ def leave(commands: typer.Typer, name: str, arguments: list[str]) -> None:
         say(f"{name}: {' '.join(text.split())}")
         code = 2
     except (typer.Abort, KeyboardInterrupt) as stopped:
-        # a second Ctrl-C in the midst of leaving would leave semaphores behind
+        # a second Ctrl-C while the process ends would leave semaphores behind
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
         say(f"{name}: {str(stopped) or 'stopped by the user'}")
         code = 130

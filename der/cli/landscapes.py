@@ -76,7 +76,7 @@ class LandscapeOptions:
 def landscape(
     ring: RingOptions, path: PathOptions, wanted: LandscapeOptions, files: LandscapeFiles
 ) -> int:
-    """Map the energy: rests, wells, saddles, and barriers to fold the ring and to open it."""
+    """Map the energy: states without load, wells, saddles, and barriers to folding and opening."""
     with options_named():
         wanted.check(path, files)
         scene = path.scene(ring, error_bars=not wanted.two_dimensional)

@@ -36,19 +36,19 @@ def say(line: str) -> None:
 
 
 def show(text: str) -> bool:
-    """Print on standard output; False, in words, where it takes no more."""
+    """Print on standard output; False, and a line on standard error, if it takes no more."""
     try:
         print(text, flush=True)
     except OSError as wrong:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush
         if isinstance(wrong, BrokenPipeError):
-            return True  # whoever read our output has had enough
+            return True  # the reader of the output has closed it
         say(f"der: could not write to standard output: {wrong.strerror}")
         return False
     return True
 
 
-# --- After it --------------------------------------------------------------------------------
+# --- Files -----------------------------------------------------------------------------------
 
 
 def keep_somewhere(targets: Targets) -> None:

@@ -30,7 +30,7 @@ def integer(text: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise typer.BadParameter(f"must be a whole number, got {text!r}") from None
+        raise typer.BadParameter(f"must be an integer, got {text!r}") from None
 
 
 def numbers(name: str, text: str | None) -> tuple[float, ...] | None:

@@ -20,7 +20,7 @@ class StatesOptions:
         float | None, number_option("Rotation of each grip, rad; the ring is free if not given.")
     ] = None
     count: Annotated[
-        int, integer_option("States after which to stop; minima that these fall to are added.")
+        int, integer_option("States after which to stop; minima that these relax to are added.")
     ] = 12
     edges: Annotated[int, integer_option("Edges of the full ring.")] = 64
 
@@ -37,7 +37,7 @@ class StatesOptions:
 
 
 def states(ring: RingOptions, wanted: StatesOptions, files: StatesFiles) -> int:
-    """Find the states of a ring, free or in its grips, and which of them falls to which."""
+    """Find the states of a ring, free or in its grips, and which of them relaxes to which."""
     with options_named():
         scene = wanted.scene(ring)
         written = targets(files, "states", shapes=True)

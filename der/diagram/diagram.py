@@ -133,7 +133,7 @@ def phase_diagram(
     """
     wanted = family(name, nu=nu, ranges=ranges, finest=finest)
     if isinstance(sample, bool) or not isinstance(sample, int) or sample < 1:
-        raise ValueError(f"sample must be a whole number from 1, got {sample!r}")
+        raise ValueError(f"sample must be an integer from 1, got {sample!r}")
     folder = _made(folder)
     clock = [time.perf_counter()]
     with Store(folder / STORE) as store, started(workers, scheduler) as crew:

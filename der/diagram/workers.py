@@ -35,7 +35,7 @@ class Workers(Protocol):
         """Replace an executor that broke."""
 
     def close(self) -> None:
-        """Let them go, their work done."""
+        """End them once their work is done."""
 
     def stop(self) -> None:
         """End at once; tasks in flight are lost."""
@@ -93,7 +93,7 @@ class Processes:
         self.executor = self._pool()
 
     def close(self) -> None:
-        """Let them go, their work done."""
+        """End them once their work is done."""
         self.executor.shutdown()
 
     def stop(self) -> None:
@@ -164,7 +164,7 @@ def processes(number: int | None) -> int:
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
     if isinstance(number, bool) or not isinstance(number, int) or number < 1:
-        raise ValueError(f"workers must be a whole number from 1, got {number!r}")
+        raise ValueError(f"workers must be an integer from 1, got {number!r}")
     return number
 
 

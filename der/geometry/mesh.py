@@ -112,7 +112,7 @@ def _segment(ring: Ring, begin: float, end: float) -> _Segment:
 
 
 def _shared(weights: list[float], total: int) -> list[int]:
-    """Whole numbers >= 1 in proportion to ``weights``, ``total`` together (Jefferson's rule)."""
+    """Integers >= 1 in proportion to ``weights``, ``total`` together (Jefferson's rule)."""
     counts = [1] * len(weights)
     heap = [(-weight / 2.0, k) for k, weight in enumerate(weights)]
     heapq.heapify(heap)

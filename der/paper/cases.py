@@ -87,7 +87,7 @@ class Curve:
     ----------
     states : (n, 6) array in path order, STATE_COLUMNS of tables.py
     points : folds and limits among them
-    mode : of the whole path, None where it ends before pi
+    mode : of the complete path, None where it ends before pi
     shapes : of the states, None where they were not asked for
     """
 

@@ -128,7 +128,7 @@ class _Mark(NamedTuple):
 
 def _checked(columns: object) -> int:
     if isinstance(columns, bool) or not isinstance(columns, int) or columns < 2:
-        raise ValueError(f"columns must be a whole number >= 2, got {columns!r}")
+        raise ValueError(f"columns must be an integer >= 2, got {columns!r}")
     return columns
 
 

@@ -67,7 +67,7 @@ def shown(value: object) -> str:
     """A value in a sentence: one line, not too long, and whatever the value is."""
     try:
         text = str(value) if isinstance(value, Real) else repr(value)
-    except ValueError:  # whole numbers of more than 4300 digits cannot be printed
+    except ValueError:  # integers of more than 4300 digits cannot be printed
         text = f"a {type(value).__name__} of too many digits"
     text = " ".join(text.split())
     return text if len(text) <= 200 else f"{text[:190]} ..."
@@ -139,10 +139,10 @@ def truth(name: str, value: object) -> bool:
 
 
 def count(name: str, value: object) -> int:
-    """Return a whole number >= 0 that fits 64 bits."""
+    """Return an integer >= 0 that fits 64 bits."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and 0 <= value < 2**63:
         return int(value)
-    raise ValueError(f"{name} must be a whole number >= 0, got {shown(value)}")
+    raise ValueError(f"{name} must be an integer >= 0, got {shown(value)}")
 
 
 def optional(check: Callable[[str, Any], T]) -> Callable[[str, Any], T | None]:

@@ -1,4 +1,4 @@
-"""Pictures, motions and playbacks of records.
+"""Pictures, movies, pages and recordings of records.
 
 May import records, geometry and utils; never a solver.
 Begin with plots/path.py.

@@ -1,7 +1,7 @@
-"""A path as a motion: all that is to be shown, one entry a step, as arrays.
+"""The motion of a ring along a path: all that is shown of it, one entry a step, as arrays.
 
 States are those of the path, in its order; those of a snap, between two of them, are put in from
-the falls that its shapes hold. Free of rerun, which only sends what is worked out here.
+the dynamics that the path's shapes hold.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ class Motion:
 
     x: Array  # (n, N, 3) vertices
     frames: Array  # (n, N, 3, 3) material frames of the edges
-    position: NDArray[np.int64]  # (n,) in the path; -1 in the middle of a fall
+    position: NDArray[np.int64]  # (n,) in the path; -1 within a snap
     gamma: Array  # (n,) rad
-    moment: Array  # (n,) GJ/a; nan in the middle of a fall
+    moment: Array  # (n,) GJ/a; nan within a snap
     energy: Array  # (n,) GJ/a
     density: Array  # (2, n, N) each of ENERGIES over length, at the vertices
     section: Section
     classes: tuple[str, ...]  # (m,) symmetry classes of the softest modes
-    eigenvalues: Array  # (n, m); nan in the middle of a fall
-    u: Array | None  # (n, N, 3) displacements in the softest mode; nan in the middle of a fall
+    eigenvalues: Array  # (n, m); nan within a snap
+    u: Array | None  # (n, N, 3) displacements in the softest mode; nan within a snap
 
     @property
     def size(self) -> float:
@@ -64,7 +64,7 @@ class Motion:
 
 
 def animate(path: Path, *, rest: Array | None = None) -> Motion:
-    """The motion of a path: its states, with its falls put in between.
+    """The motion of a path: its states, with the shapes of its snaps in between.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def animate(path: Path, *, rest: Array | None = None) -> Motion:
     """
     if path.shapes is None or not len(path):
         raise ValueError("path must have shapes to be recorded, got none")
-    shapes, falls, softest = path.shapes, path.shapes.falls, path.shapes.softest
+    shapes, snaps, softest = path.shapes, path.shapes.falls, path.shapes.softest
     n, n_v, _ = shapes.x.shape
     if rest is not None:
         rest = checks.checked_array("rest", rest, (n_v, 3))
@@ -87,10 +87,10 @@ def animate(path: Path, *, rest: Array | None = None) -> Motion:
         rest = number(path.ring, "natural_curvature", 1.0) * _strains(shapes.frames[0])
     else:
         raise ValueError(f"rest must be given where gamma begins at {path.gamma[0]:g}")
-    order = _order(n, falls)
+    order = _order(n, snaps)
     position = np.where(order < n, order, -1)
     x, frames, gamma, energy = (
-        np.concatenate([states, *(getattr(fall, name) for fall in falls)])[order]
+        np.concatenate([states, *(getattr(snap, name) for snap in snaps)])[order]
         for name, states in (
             ("x", shapes.x),
             ("frames", shapes.frames),
@@ -114,14 +114,14 @@ def animate(path: Path, *, rest: Array | None = None) -> Motion:
     )
 
 
-def _order(n: int, falls: Sequence[Fall]) -> NDArray[np.int64]:
-    """Places, in the `n` states followed by all falls, of the motion's steps."""
-    after = [np.full(len(fall.x), fall.after + 0.5) for fall in falls]
+def _order(n: int, snaps: Sequence[Fall]) -> NDArray[np.int64]:
+    """Places, in the `n` states followed by all snaps, of the motion's steps."""
+    after = [np.full(len(snap.x), snap.after + 0.5) for snap in snaps]
     return np.argsort(np.concatenate([np.arange(n), *after]), kind="stable")
 
 
 def spread(values: Array, position: NDArray[np.int64]) -> Array:
-    """Values of the states at every step of the motion, nan in the middle of a fall."""
+    """Values of the states at every step of the motion, nan within a snap."""
     out = np.asarray(values, dtype=float)[position]
     out[position < 0] = np.nan
     return out

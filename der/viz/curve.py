@@ -30,8 +30,8 @@ def smooth(path: Path, height: Array, per: int = 16) -> Array:
     """Return `per` points an interval on a smooth curve (gamma/pi, height) through all states.
 
     The natural cubic spline of the chord length along (gamma, M), which turns with the path through
-    folds; on circles it is within 0.3% of the panel of the true path, monotone cubics within 0.4%.
-    Snaps are straight lines, but for the moment of a ring that falls under a dead one: that is
+    folds; on circles it is within 0.3% of the range of the true path, monotone cubics within 0.4%.
+    Snaps are straight lines, but for the moment of a ring that snaps under a dead one: that is
     level, and ends at the ring's own where it meets a stop.
     """
     values = np.column_stack([path.gamma / math.pi, height])
@@ -62,10 +62,10 @@ def sides(path: Path) -> list[bool | str | None]:
     if len(known) == 1:
         return known
     found = [a if a is not None else b for a, b in pairwise(known)]
-    for way in (range(1, len(found)), range(len(found) - 2, -1, -1)):
-        for k in way:
+    for order in (range(1, len(found)), range(len(found) - 2, -1, -1)):
+        for k in order:
             if found[k] is None:
-                found[k] = found[k - 1 if way.step > 0 else k + 1]
+                found[k] = found[k - order.step]
     for k in _snaps(path):
         found[k - 1] = SNAP
     return found
@@ -79,11 +79,12 @@ def _snaps(path: Path) -> list[int]:
 def pieces(path: Path) -> list[tuple[int, int]]:
     """First and last states of the smooth pieces: cut at snaps, and where gamma is turned back."""
     landed = _snaps(path)
-    way = np.diff(np.column_stack([path.gamma, path.moment]), axis=0)
+    steps = np.diff(np.column_stack([path.gamma, path.moment]), axis=0)
     turned = [
         k
         for k in range(1, len(path) - 1)
-        if np.dot(way[k - 1], way[k]) < -0.9 * np.linalg.norm(way[k - 1]) * np.linalg.norm(way[k])
+        if np.dot(steps[k - 1], steps[k])
+        < -0.9 * np.prod(np.linalg.norm(steps[k - 1 : k + 1], axis=1))
     ]
     starts = sorted({0, *landed, *turned})
     lasts = [k - 1 if k in landed else k for k in starts[1:]] + [len(path) - 1]

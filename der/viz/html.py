@@ -35,6 +35,14 @@ FRAMES = 160  # steps of the slider, special points besides
 POINTER, ARC = 0.42, 13  # length of a grip's arrow over the mean radius; points on its arc
 REACH = 1.3  # half the length of the twisting axis, over the farthest point along it
 AXES = {"moment": {"xaxis": "x", "yaxis": "y"}, "energy": {"xaxis": "x2", "yaxis": "y2"}}
+LEGEND = {
+    "orientation": "h",
+    "x": 1.0,
+    "xanchor": "right",
+    "y": -0.09,
+    "yanchor": "top",
+    "font": {"size": 11},
+}
 EYE = {"x": 1.14, "y": 0.64, "z": 0.48}
 
 
@@ -242,57 +250,46 @@ def _range(paths: Sequence[Path], name: str) -> list[float]:
 
 def _layout(paths: Sequence[Path], motions: Sequence[Motion]) -> dict[str, Any]:
     """Where the views lie, and in which limits: these never change."""
-    two = len(motions) == 2
-    turns = [value / math.pi for value in _range(paths, "gamma")]
+    if len(motions) == 2:
+        domains = {"scene": ([0.0, 0.48], [0.42, 1.0]), "scene2": ([0.52, 1.0], [0.42, 1.0])}
+        (mx, my), (ux, uy) = ([0.05, 0.47], [0.0, 0.36]), ([0.56, 1.0], [0.0, 0.36])
+    else:
+        domains = {"scene": ([0.0, 0.52], [0.0, 1.0])}
+        (mx, my), (ux, uy) = ([0.6, 1.0], [0.55, 1.0]), ([0.6, 1.0], [0.0, 0.45])
+    scene = _scene(motions)
+    scenes = {name: scene | {"domain": {"x": x, "y": y}} for name, (x, y) in domains.items()}
+    turned, turns = "rotation of a grip, γ/π", [v / math.pi for v in _range(paths, "gamma")]
+    moments, energies = _range(paths, "moment"), _range(paths, "energy")
+    return {
+        **scenes,
+        "xaxis": _axis(turned, domain=mx, anchor="y", range=turns),
+        "yaxis": _axis("moment M a/GJ", domain=my, anchor="x", range=moments),
+        "xaxis2": _axis(turned, domain=ux, anchor="y2", matches="x"),
+        "yaxis2": _axis("energy U a/GJ", domain=uy, anchor="x2", range=energies),
+        "margin": {"l": 10, "r": 16, "t": 8, "b": 46},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "font": {"family": "system-ui, sans-serif", "color": INK},
+        "legend": LEGEND,
+        "uirevision": "keep",
+        "hovermode": "closest",
+    }
+
+
+def _scene(motions: Sequence[Motion]) -> dict[str, Any]:
+    """The view of a ring, in limits that hold it at all times."""
     reach = max(float(np.abs(motion.x).max()) + 0.6 * motion.section.h for motion in motions)
     side = {"range": [-reach, reach], "visible": False}
-    scene = {
+    return {
         **{f"{name}axis": dict(side) for name in "xyz"},
         "aspectmode": "cube",
         "camera": {"eye": EYE, "up": {"x": 0, "y": 0, "z": 1}},
         "dragmode": "orbit",
     }
-    axis = {
-        "showgrid": True,
-        "gridcolor": PALE,
-        "zerolinecolor": "#bdbdbd",
-        "linecolor": QUIET,
-        "ticks": "outside",
-        "tickcolor": QUIET,
-        "tickfont": {"size": 11},
-        "title": {"font": {"size": 12}},
-    }
 
-    def labelled(text: str, **more: Any) -> dict[str, Any]:
-        return {**axis, "title": {"text": text, "font": {"size": 12}, "standoff": 6}, **more}
 
-    if two:
-        domains = {"scene": ([0.0, 0.48], [0.42, 1.0]), "scene2": ([0.52, 1.0], [0.42, 1.0])}
-        panels = [([0.05, 0.47], [0.0, 0.36]), ([0.56, 1.0], [0.0, 0.36])]
-    else:
-        domains = {"scene": ([0.0, 0.52], [0.0, 1.0])}
-        panels = [([0.6, 1.0], [0.55, 1.0]), ([0.6, 1.0], [0.0, 0.45])]
-    scenes = {name: scene | {"domain": {"x": x, "y": y}} for name, (x, y) in domains.items()}
-    (mx, my), (ux, uy) = panels
-    turned = "rotation of a grip, γ/π"
-    return {
-        **scenes,
-        "xaxis": labelled(turned, domain=mx, anchor="y", range=turns),
-        "yaxis": labelled("moment M a/GJ", domain=my, anchor="x", range=_range(paths, "moment")),
-        "xaxis2": labelled(turned, domain=ux, anchor="y2", matches="x"),
-        "yaxis2": labelled("energy U a/GJ", domain=uy, anchor="x2", range=_range(paths, "energy")),
-        "margin": {"l": 10, "r": 16, "t": 8, "b": 46},
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
-        "font": {"family": "system-ui, sans-serif", "color": INK},
-        "legend": {
-            "orientation": "h",
-            "x": 1.0,
-            "xanchor": "right",
-            "y": -0.09,
-            "yanchor": "top",
-            "font": {"size": 11},
-        },
-        "uirevision": "keep",
-        "hovermode": "closest",
-    }
+def _axis(text: str, **more: Any) -> dict[str, Any]:
+    """An axis of a curve, with its label."""
+    look = {"showgrid": True, "gridcolor": PALE, "zerolinecolor": "#bdbdbd", "linecolor": QUIET}
+    ticks = {"ticks": "outside", "tickcolor": QUIET, "tickfont": {"size": 11}}
+    return {**look, **ticks, "title": {"text": text, "font": {"size": 12}, "standoff": 6}, **more}

@@ -1,5 +1,5 @@
 "use strict";
-// Moves the rings, the dots and the words of the page to the step that the slider says.
+// Moves the rings, the dots and the captions of the page to the step that the slider says.
 (() => {
   const { figure, rings } = JSON.parse(document.getElementById("data").textContent);
   const stage = document.getElementById("stage");
@@ -46,13 +46,13 @@
     return out;
   };
 
-  const words = rings.map((ring) => {
+  const captions = rings.map((ring) => {
     const box = document.createElement("div");
     box.className = "ring";
     box.innerHTML = "<b></b><span class=numbers></span><span class=stability></span><span class=event></span>";
     box.querySelector("b").textContent = ring.name;
     box.querySelector("b").style.color = ring.colour;
-    document.getElementById("words").append(box);
+    document.getElementById("captions").append(box);
     return box;
   });
 
@@ -71,7 +71,7 @@
       }
     }
     rings.forEach((ring, k) => {
-      const said = (name) => words[k].querySelector("." + name);
+      const said = (name) => captions[k].querySelector("." + name);
       said("numbers").textContent = ring.numbers[step];
       said("stability").textContent = ring.stability[step];
       said("stability").dataset.stable = ring.stable[step];

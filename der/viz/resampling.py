@@ -1,6 +1,6 @@
 """Animations resampled to even motion, and two of them in step.
 
-A path has few states, close together where it bends: good for reading, not for watching. Here an
+A path has few states, close together where it bends: good for reading, not for watching. Here a
 motion is resampled in steps of about equal motion. Between two equilibria the ring is drawn on a
 spline through its states (as the curves are, see `curve`), within snaps on a straight line.
 """
@@ -113,7 +113,7 @@ def between(path: Path, motion: Motion, places: Array) -> Motion:
         if motion.position[step - 1] >= 0:  # no history
             at = np.where((at > step - 1) & (at < step), (at + 0.5).astype(int), at)
     k = np.minimum(at.astype(int), max(last - 1, 0))
-    falling = (motion.position[k] < 0) | (motion.position[np.minimum(k + 1, last)] < 0)
+    snapping = (motion.position[k] < 0) | (motion.position[np.minimum(k + 1, last)] < 0)
     n, n_v, _ = motion.x.shape
     density = np.moveaxis(motion.density, 0, -1)
     flat = np.concatenate(
@@ -122,7 +122,7 @@ def between(path: Path, motion: Motion, places: Array) -> Motion:
     drawn = _splined(path, motion, flat.reshape(n, -1), at).reshape(len(at), n_v, -1)
     share = at - k
     position = motion.position[np.where(share == 1.0, np.minimum(k + 1, last), k)]
-    inside = falling & (position < 0) | falling & (share > 0.0) & (share < 1.0)
+    inside = snapping & (position < 0) | snapping & (share > 0.0) & (share < 1.0)
     return replace(
         motion,
         x=drawn[..., :3],
@@ -139,7 +139,7 @@ def between(path: Path, motion: Motion, places: Array) -> Motion:
 
 
 def _even(path: Path, motion: Motion, n: int) -> Array:
-    """Places in the motion at equal motion, half of the ring and half of its grips."""
+    """Places in steps of equal motion, half of the ring and half of its grips."""
     if len(motion.x) == 1:
         return np.zeros(1)
     moved = np.linalg.norm(np.diff(motion.x, axis=0), axis=2).max(axis=1)
@@ -158,10 +158,10 @@ def _kept(path: Path, motion: Motion) -> list[float]:
 
 
 def _on_curve(path: Path, motion: Motion, name: str, at: Array, inside: Array) -> Array:
-    """Values at places of the motion: on the curve as it is drawn, within falls on their own."""
+    """Values at places of the motion: on the curve as it is drawn, within snaps on their own."""
     steps = np.arange(len(motion.x))
     known = motion.position >= 0
-    # a place in the path: the steps of a fall are none, their place is that of the state they leave
+    # a place in the path: the steps of a snap have none, theirs is that of the state they leave
     place = np.interp(at, steps[known], motion.position[known].astype(float))
     if len(path) == 1:
         values = np.repeat(getattr(path, name), len(at))
@@ -170,14 +170,14 @@ def _on_curve(path: Path, motion: Motion, name: str, at: Array, inside: Array) -
         curve = smooth(path, height, PER)[:, column] * (np.pi if name == "gamma" else 1.0)
         values = np.interp(place * PER, np.arange(len(curve)), curve)
     own: Array = getattr(motion, name)
-    falling = np.interp(at, steps, np.nan_to_num(own))
+    snapping = np.interp(at, steps, np.nan_to_num(own))
     if name == "moment":
-        falling = np.full(len(at), np.nan)
-    return np.where(inside, falling, values)
+        snapping = np.full(len(at), np.nan)
+    return np.where(inside, snapping, values)
 
 
 def _splined(path: Path, motion: Motion, values: Array, at: Array) -> Array:
-    """Rows of values (n, m) at places: splines along the smooth pieces, straight within falls."""
+    """Rows of values (n, m) at places: splines along the smooth pieces, straight within snaps."""
     from scipy.interpolate import CubicSpline
 
     k = np.minimum(at.astype(int), max(len(values) - 2, 0))

@@ -290,7 +290,7 @@ def test_landscapes_come_back_as_they_were(tmp_path):
         (curves, '"timing"', '"time"', "timing is missing"),
         (sheet, '"energy": [[', '"energy": [[1.0, ', r"energy\[0\] has 9 entries, distance has 8"),
         (sheet, '"minima": [[', '"minima": [[[], ', r"minima\[0\] has 9 entries, distance has 8"),
-        (alone, '"index": 1', '"index": -1', r"saddle.index must be a whole number >= 0, got -1"),
+        (alone, '"index": 1', '"index": -1', r"saddle.index must be an integer >= 0, got -1"),
         (alone, '"ends": ["', '"ends": [3, "', r"ends\[0\] must be a text, got 3"),
     ],
 )

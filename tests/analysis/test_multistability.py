@@ -221,8 +221,8 @@ def test_ctrl_c_keeps_what_was_found():
     [
         ({"gamma": -0.1}, "gamma must be a number from 0 to 2 pi, got -0.1"),
         ({"gamma": math.nan}, "gamma must be a number from 0 to 2 pi, got nan"),
-        ({"count": 0}, "count must be a whole number from 1 to 200, got 0"),
-        ({"count": 2.0}, "count must be a whole number from 1 to 200, got 2.0"),
+        ({"count": 0}, "count must be an integer from 1 to 200, got 0"),
+        ({"count": 2.0}, "count must be an integer from 1 to 200, got 2.0"),
     ],
 )
 def test_bad_input_is_named(options, message):
@@ -280,7 +280,7 @@ def test_the_record_comes_back_as_it_was(tmp_path):
         (lambda e: e.update(schema=2), "schema is 2, this version reads 1"),
         (lambda e: e.pop("gamma"), "gamma is missing"),
         (lambda e: e["states"][0].update(energy="low"), r"states\[0\].energy must be a finite"),
-        (lambda e: e["states"][0].update(index=-1), r"states\[0\].index must be a whole number"),
+        (lambda e: e["states"][0].update(index=-1), r"states\[0\].index must be an integer"),
         (lambda e: e["states"][0].pop("name"), r"states\[0\].name is missing"),
         (lambda e: e["states"][1].update(name="flat"), "names of their own"),
         (lambda e: e["transitions"][0].update(end="nowhere"), "between states, got 'nowhere'"),
@@ -422,7 +422,7 @@ def test_an_unfinished_search_is_saved(capsys, tmp_path, monkeypatch, status, co
     ("words", "message"),
     [
         (("--gamma", "7"), "der: --gamma must be a number from 0 to 2 pi, got 7.0"),
-        (("--count", "0"), "der: --count must be a whole number from 1 to 200, got 0"),
+        (("--count", "0"), "der: --count must be an integer from 1 to 200, got 0"),
         (("--edges", "30"), "der: --edges must be divisible by 4, as the path of twisting"),
         (("--edges", "2048"), "der: --edges must be at most 1024"),
         (("--plot", "x.txt"), "der: --plot must end in"),

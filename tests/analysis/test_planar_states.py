@@ -210,7 +210,7 @@ def _knots(ring):
 
 @pytest.mark.parametrize("n", [0, 10, 13, 24.0, True, "24", None])
 def test_n_is_an_even_whole_number(n):
-    with pytest.raises(ValueError, match="n must be an even whole number >= 12"):
+    with pytest.raises(ValueError, match="n must be an even integer >= 12"):
         folded(der.circle(), n)
 
 

@@ -121,7 +121,7 @@ def test_a_path_ends_where_it_has_taken_too_much(monkeypatch):
 
 
 def test_a_tolerance_between_two_meshes_is_reached():
-    """Rounding of intervals to whole numbers between joints must not ask for the same mesh forever.
+    """Rounding of intervals to integers between joints must not ask for the same mesh forever.
 
     A rounded square whose fitted meshes of 4 and of 5 intervals are one and the same.
     """

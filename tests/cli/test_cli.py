@@ -125,8 +125,8 @@ WRONG = [
     (line("--edges", "0"), "--edges", "0", "from 8 to 65536"),
     (line("--edges", "-64"), "--edges", "-64", "from 8 to 65536"),
     (line("--edges", "9" * 30), "--edges", "9" * 30, "from 8 to 65536"),
-    (line("--edges", "6.5"), "--edges", "'6.5'", "a whole number"),
-    (line("--edges", "many"), "--edges", "'many'", "a whole number"),
+    (line("--edges", "6.5"), "--edges", "'6.5'", "an integer"),
+    (line("--edges", "many"), "--edges", "'many'", "an integer"),
     (line("--gamma-max", "0"), "--gamma-max", "0.0", "finite number > 0"),
     (line("--gamma-max", "-1"), "--gamma-max", "-1", "finite number > 0"),
     (line("--gamma-max", "nan"), "--gamma-max", "nan", "finite number > 0"),
@@ -243,7 +243,7 @@ def test_bad_input_is_refused_in_one_line(run, folder, words, option, value, all
 
 EVIDENCE = [
     (("stress", "--quick", "--long"), "--quick", "both", "together"),
-    (("stress", "--seed", "-1"), "--seed", "-1", "a whole number >= 0"),
+    (("stress", "--seed", "-1"), "--seed", "-1", "an integer >= 0"),
     (("bench", "--json", "no/such/f.json"), "--json", "'no/such/f.json'", "folder"),
     (("bench", "--only", "speed"), "--only", "'speed'", "paths, needs"),
 ]

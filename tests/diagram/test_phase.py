@@ -162,8 +162,8 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch, ca
     ("options", "message"),
     [
         ({"ranges": {"r_over_a": (0.1, 1.0)}}, "ranges of fig3a must be of b_over_a, h_over_t"),
-        ({"sample": 0}, "sample must be a whole number from 1, got 0"),
-        ({"workers": 0}, "workers must be a whole number from 1, got 0"),
+        ({"sample": 0}, "sample must be an integer from 1, got 0"),
+        ({"workers": 0}, "workers must be an integer from 1, got 0"),
         ({"workers": 2, "scheduler": "tcp://x:1"}, "workers cannot be given together with a"),
     ],
 )
@@ -376,7 +376,7 @@ def test_killed_command_refuses_what_it_cannot_do(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     for options, words in (
         (["--out", str(tmp_path)], "out must be an empty folder"),
-        (["--times", "0"], "times must be a whole number from 1, got 0"),
+        (["--times", "0"], "times must be an integer from 1, got 0"),
     ):
         with pytest.raises(SystemExit):
             killed.main(options)

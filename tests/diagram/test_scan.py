@@ -422,7 +422,7 @@ def test_scheduler_that_does_not_answer_is_refused(monkeypatch):
 @pytest.mark.parametrize("number", [0, -1, True, 1.5])
 def test_wrong_number_of_workers_is_refused(number):
     with (
-        pytest.raises(ValueError, match="workers must be a whole number from 1, got"),
+        pytest.raises(ValueError, match="workers must be an integer from 1, got"),
         workers(number),
     ):
         pass

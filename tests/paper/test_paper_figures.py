@@ -72,7 +72,7 @@ def test_an_unknown_name_is_refused_before_anything_is_drawn(tmp_path):
 
 @pytest.mark.parametrize("workers", [0, -1, True, 1.5, "2"])
 def test_a_wrong_number_of_workers_is_refused(tmp_path, workers):
-    with pytest.raises(ValueError, match=r"workers must be a whole number from 1, got "):
+    with pytest.raises(ValueError, match=r"workers must be an integer from 1, got "):
         draw(["fig2c"], tmp_path, workers)
 
 

@@ -117,7 +117,7 @@ def test_envelope_is_smaller_than_the_convex_hull():
 
 @pytest.mark.parametrize("n", [11, 2.0, True])
 def test_number_of_points_is_checked(n):
-    with pytest.raises(ValueError, match="n must be an even whole number"):
+    with pytest.raises(ValueError, match="n must be an even integer"):
         packing_ratio(der.circle(), n)
 
 
@@ -148,7 +148,7 @@ def test_figures_write_a_picture_and_its_numbers(figure, name, header, last, tmp
 
 def test_figures_refuse_what_they_cannot_do(tmp_path):
     """Too few columns, a folder that is not there: nothing is written."""
-    with pytest.raises(ValueError, match="columns must be a whole number >= 2, got 1"):
+    with pytest.raises(ValueError, match="columns must be an integer >= 2, got 1"):
         fig3b(tmp_path, columns=1)
     with pytest.raises(FileNotFoundError):
         fig3b(tmp_path / "none", columns=2)

@@ -199,7 +199,7 @@ def test_records_come_back(tmp_path):
         (lambda s: der.squeeze(s, math.pi), "distance must be .* less than 3.14159 .the ring dr"),
         (lambda s: der.squeeze(s, -0.1), "distance must be a number from 0"),
         (lambda s: der.squeeze(s, math.nan), "distance must be"),
-        (lambda s: der.planar(s, turns=0), "turns must be a whole number from 1 to 4 on 32 edges"),
+        (lambda s: der.planar(s, turns=0), "turns must be an integer from 1 to 4 on 32 edges"),
         (lambda s: der.planar(s, turns=True), "turns must be"),
         (lambda _: der.planar("ring"), "scene must be a der.Scene, got 'ring'"),
         (lambda _: der.planar(scene(der.circle(), stretch="finite")), "stretch must be"),

@@ -102,7 +102,7 @@ def test_nothing_more_comes_back_than_was_kept(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (lambda: fall(after=-1), "after of a fall must be a whole number >= 0, got -1"),
+        (lambda: fall(after=-1), "after of a fall must be an integer >= 0, got -1"),
         (lambda: replace(fall(), x=np.zeros((7, 5))), "x of a fall must be an array of numbers"),
         (lambda: replace(fall(), gamma=np.zeros(6)), r"gamma of a fall must have shape \(7,\)"),
         (lambda: replace(shapes(), falls=(fall(after=4),)), "after of a fall .* below 4, got 4"),

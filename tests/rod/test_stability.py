@@ -92,7 +92,7 @@ def test_index_is_zero_on_the_whole_path_at_h_over_t_4():
 def test_index_is_one_between_the_folds_at_h_over_t_1_6():
     """States between the folds have one unstable mode, those outside none.
 
-    Truth: the sign of the stiffness of the in-phase mode changes at a fold. Whole numbers.
+    Truth: the sign of the stiffness of the in-phase mode changes at a fold. Integers.
     """
     found = path(1.6, 64)
     first, second = (point.position for point in found.folds)
@@ -109,7 +109,7 @@ def test_indices_beyond_pi(n_edges):
     """At h/t = 1 the index runs 0, 1, 3, 1, 3, 2 until folded, by two folds and three pairs.
 
     Truth: modes odd under an arm's own half-turn come in exact pairs; the folded ring has index 2
-    here (n-covered circle: 4 with the grips removed). Whole numbers.
+    here (n-covered circle: 4 with the grips removed). Integers.
     """
     found = path(1.0, n_edges)
     assert changes(found) == [

@@ -1,4 +1,4 @@
-"""`--rrd` and `--live` from the command line; what they show is tested in test_view_rerun.py."""
+"""`--rrd` and `--live` from the command line; what they show is tested in test_recording.py."""
 
 import json
 import signal
@@ -114,7 +114,7 @@ def test_a_film_or_page_in_a_bad_place_is_named_before_anything_is_solved(
     [("fold", "--movie", "p.gif", b"GIF89a"), ("bvp", "--html", "p.html", b"<!DOCT")],
 )
 def test_film_and_page_are_written(tmp_path, monkeypatch, solver, option, name, start):
-    """Of either solver; the motion in few pictures here."""
+    """Of either solver; in few pictures here."""
     monkeypatch.setattr(save_movie, "__kwdefaults__", {"fps": 2, "frames": 2})
     with pytest.raises(SystemExit) as ended:
         main([solver, *SMALL[1:], "--gamma-max", "0.5", option, str(tmp_path / name)])
@@ -219,7 +219,7 @@ def test_live_serves_until_ctrl_c(tmp_path):
         try:
             lines = [live.stderr.readline(), live.stderr.readline()]
             assert f"rerun rerun+http://127.0.0.1:{port}/proxy" in lines[0]
-            assert lines[1] == "der: the motion can be watched until Ctrl-C\n"
+            assert lines[1] == "der: the film can be watched until Ctrl-C\n"
             socket.create_connection(("127.0.0.1", port), timeout=5).close()
             live.send_signal(signal.SIGINT)
             assert live.wait(timeout=20) == 0

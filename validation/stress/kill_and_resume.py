@@ -277,7 +277,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     for name in ("times", "workers"):
         if getattr(given, name) < 1:
-            parser.error(f"{name} must be a whole number from 1, got {getattr(given, name)}")
+            parser.error(f"{name} must be an integer from 1, got {getattr(given, name)}")
     with tempfile.TemporaryDirectory() as beside:
         folder = File(given.out or beside)
         folder.mkdir(parents=True, exist_ok=True)

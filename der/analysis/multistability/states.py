@@ -94,7 +94,7 @@ def check(scene: Scene, gamma: float | None, count: int) -> None:
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a der.Scene, got {shown(scene)}")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
-        raise ValueError(f"count must be a whole number from 1 to {MOST}, got {shown(count)}")
+        raise ValueError(f"count must be an integer from 1 to {MOST}, got {shown(count)}")
     if gamma is not None:
         allowed = "a number from 0 to 2 pi"
         checked_number("gamma", gamma, allowed, lambda g: 0.0 <= g <= 2.0 * math.pi)

@@ -114,7 +114,7 @@ def check_planar(scene: Scene, turns: int | None = None) -> int:
         return min(max(_TURNS, math.ceil(abs(scene.ring.natural_ratio))), most)
     if isinstance(turns, bool) or not isinstance(turns, int) or not 1 <= turns <= most:
         raise ValueError(
-            f"turns must be a whole number from 1 to {most} on {scene.n_edges} edges, "
+            f"turns must be an integer from 1 to {most} on {scene.n_edges} edges, "
             f"got {shown(turns)}"
         )
     return turns

@@ -157,7 +157,7 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
 
 
 def _starts(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Iterator[At[Value]]:
-    """Points of a curve from which one near ``u`` is looked for, the dear ones last."""
+    """Points of a curve from which one near ``u`` is sought, those that cost most last."""
     yield from ends
     yield from _led(ends, u, condition)
 

@@ -1,14 +1,14 @@
-"""What stands beside a ring in a recording: curves over gamma, series over steps, and words."""
+"""Beside a ring in a recording: curves over gamma, series over steps, and events."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
+from typing import Any
 
 import numpy as np
 import rerun as rr
-from numpy.typing import ArrayLike
 
 from der.records.path import Path
 from der.utils.checks import Array
@@ -16,8 +16,8 @@ from der.viz.animation import spread
 from der.viz.captions import event_text
 from der.viz.curve import SNAP, stretches
 from der.viz.palette import POINTS
-from der.viz.rerun.axes import PlotAxes, dotted
-from der.viz.rerun.entities import CHALK, GREEN, ORANGE, QUIET, SKY, VERMILION, Colour, Entities
+from der.viz.rerun.axes import PlotAxes, dotted, send_axes, send_labels
+from der.viz.rerun.entities import GREEN, ORANGE, QUIET, SKY, VERMILION, Colour, Entities
 from der.viz.ribbon import viridis
 
 # label, colour and radius of a stretch of the curves by whether it is stable
@@ -53,93 +53,65 @@ def send_key(sent: Entities) -> None:
     send_labels(sent, "key/values", [[0, 14], [150, 14], [300, 14]], ends)
 
 
-def send_labels(
-    sent: Entities,
-    entity: str,
-    places: ArrayLike,
-    labels: Sequence[str],
-    *,
-    colour: Colour = CHALK,
-) -> None:
-    """Words on a 2-D panel."""
-    points = rr.Points2D(places, labels=labels, radii=0.01, colors=colour, show_labels=True)
-    sent.still(entity, points)
-
-
 def send_curve(
     sent: Entities,
     path: Path,
     name: str,
     *,
-    panel: PlotAxes | None = None,
+    axes: PlotAxes | None = None,
     entity: str = "",
     colour: Colour | None = None,
 ) -> None:
-    """One panel: the whole curve over gamma, its special points, and the present state on it.
+    """The curve over gamma, its special points, and the present state on it.
 
     Parameters
     ----------
-    panel : one that is shared, and has axes; a new one, with axes, if not given.
+    axes : shared ones, that are sent already; new ones if not given.
     entity : where it goes; ``curves/name`` if not given.
-    colour : of the curve and its dot, where several share a panel.
+    colour : of the curve and its dot, where several share axes.
     """
     motion, entity = sent.motion, entity or f"curves/{name}"
     heights: Array = getattr(path, name)
-    if panel is None:
-        panel = PlotAxes(path.gamma, heights)
-        send_axes(sent, entity, panel)
+    if axes is None:
+        axes = PlotAxes(path.gamma, heights)
+        send_axes(sent, entity, axes)
     pieces = [
-        (side, piece)
-        for side, line in stretches(path, heights)
-        for piece in panel.inside(panel.place(math.pi * line[:, 0], line[:, 1]))
+        (kind, piece)
+        for kind, line in stretches(path, heights)
+        for piece in axes.inside(axes.place(math.pi * line[:, 0], line[:, 1]))
     ]
+    _send_stretches(sent, pieces, entity, colour)
+    at = [point.position for point in path.points]
+    if at:
+        labels = np.array([POINTS[point.kind] for point in path.points])
+        places = axes.place(path.gamma[at], heights[at])
+        shown = axes.holds(places)
+        look: dict[str, Any] = {"colors": ORANGE, "radii": 1.3, "show_labels": False}
+        marks = rr.Points2D(places[shown], labels=labels[shown].tolist(), **look)
+        sent.still(f"{entity}/points", marks)
+    values: Array = getattr(motion, name)
+    places = axes.place(motion.gamma, values)
+    known = np.isfinite(values) & axes.holds(places)
+    shade, size = (colour, 3.2) if colour else ((255, 255, 255), 2.4)
+    sent.still(f"{entity}/now", rr.Points2D.from_fields(colors=shade, radii=size, draw_order=50.0))
+    columns = rr.Points2D.columns(positions=places[known].astype(np.float32))
+    sent.run(f"{entity}/now", columns.partition(known.astype(int)))
+
+
+def _send_stretches(
+    sent: Entities,
+    pieces: Sequence[tuple[bool | str | None, Array]],
+    entity: str,
+    colour: Colour | None,
+) -> None:
+    """The curve by its stability; dotted where the ring snaps, or is unstable in one colour."""
     for key, (label, own, width) in STRETCHES.items():
-        strips = [piece for side, piece in pieces if side is key]
+        strips = [piece for kind, piece in pieces if kind is key]
         if key is SNAP or (key is False and colour is not None):
             strips = [dash for strip in strips for dash in dotted(strip)]
         if strips:
             lines = rr.LineStrips2D(strips, colors=colour or own, radii=width)
             sent.still(f"{entity}/{label}", lines)
-    at = [point.position for point in path.points]
-    if at:
-        labels = np.array([POINTS[point.kind] for point in path.points])
-        places = panel.place(path.gamma[at], heights[at])
-        shown = panel.holds(places)
-        marks = rr.Points2D(
-            places[shown],
-            colors=ORANGE,
-            radii=1.3,
-            labels=labels[shown].tolist(),
-            show_labels=False,
-        )
-        sent.still(f"{entity}/points", marks)
-    values: Array = getattr(motion, name)
-    places = panel.place(motion.gamma, values)
-    known = np.isfinite(values) & panel.holds(places)
-    dots = places[known]
-    shade, size = (colour, 3.2) if colour else ((255, 255, 255), 2.4)
-    sent.still(f"{entity}/now", rr.Points2D.from_fields(colors=shade, radii=size, draw_order=50.0))
-    columns = rr.Points2D.columns(positions=dots.astype(np.float32))
-    sent.run(f"{entity}/now", columns.partition(known.astype(int)))
-
-
-def send_axes(sent: Entities, entity: str, panel: PlotAxes) -> None:
-    """The axes of a panel with their ticks."""
-    foot = panel.values[0]
-    across = panel.place(panel.gamma, foot)
-    upright = panel.place(panel.gamma[0], panel.values)
-    lines = [across, upright]
-    if foot <= 0.0 <= panel.values[1]:
-        lines.append(panel.place(panel.gamma, 0.0))
-    below = panel.place(panel.turns, foot)
-    beside = panel.place(panel.gamma[0], panel.rounds)
-    lines += [*np.stack([below, np.add(below, [0.0, 2.0])], axis=1)]
-    lines += [*np.stack([beside, np.add(beside, [-2.0, 0.0])], axis=1)]
-    sent.still(f"{entity}/axes", rr.LineStrips2D(lines, colors=QUIET, radii=0.2))
-    places = np.concatenate([np.add(below, [0.0, 3.0]), np.add(beside, [-9.0, -4.0])])
-    words = [f"{turn / math.pi:.5g} π" for turn in panel.turns]
-    words += [f"{value:.6g}" for value in panel.rounds]
-    send_labels(sent, f"{entity}/values", places, words)
 
 
 def send_series(
@@ -174,7 +146,7 @@ def send_series(
             sent.run(f"series/{entity}", rr.Scalars.columns(scalars=values[steps]), steps)
 
 
-# --- Words ----------------------------------------------------------------------------------
+# --- Events ---------------------------------------------------------------------------------
 
 
 def send_events(sent: Entities, path: Path, *, name: str = "") -> None:

@@ -1,7 +1,4 @@
-"""A ring in a recording: what stands still, what moves from step to step, and sending both.
-
-With `view_panels`, `view_terrain`, `view_layout` and `view_rerun` the only files that import rerun.
-"""
+"""A ring in a recording: its entities, those that never change and those that do at every step."""
 
 from __future__ import annotations
 
@@ -21,17 +18,17 @@ GHOST = 0.2  # largest displacement of the softest mode, over the mean radius
 REACH = 1.55  # half the length of the twisting axis, over the mean radius
 INK, QUIET, CHALK = (34, 34, 34), (140, 140, 140), (225, 225, 225)
 SKY, VERMILION, GREEN, ORANGE = (86, 180, 233), (213, 94, 0), (0, 158, 115), (230, 159, 0)
-PAIR = (SKY, ORANGE)  # of two rings, whose curves share panels
+PAIR = (SKY, ORANGE)  # of two rings, whose curves share axes
 ARC = 25  # points on the arc that shows a grip's rotation
 TURNED = 0.34  # radius of that arc, over the mean radius
 
 
 class Entities:
-    """A recording under way: what stands still, and what changes from step to step.
+    """The entities of a ring in a recording: sends what never changes, and what does at every step.
 
     Parameters
     ----------
-    under : where a motion that is not alone puts its sent, "first/" for instance.
+    under : before the names of entities where there are two rings, "first/" for instance.
     gamma : (n,) of the second timeline [rad]; the motion's own if not given.
     top : the energy density of the brightest colour; the motion's own if not given.
     """
@@ -57,7 +54,7 @@ class Entities:
         self.stream.log(self.under + entity, *what, static=True, strict=True)
 
     def run(self, entity: str, columns: rr.ComponentColumnList, steps: ArrayLike = ()) -> None:
-        """Send columns, a row a step, of the whole motion or of some steps."""
+        """Send columns, a row a step, of all steps or of some."""
         at = np.asarray(steps, dtype=np.int64)
         if not len(at):
             at = np.arange(len(self.motion.x))
@@ -95,7 +92,7 @@ def _send_ribbon(sent: Entities) -> None:
 
 
 def _send_lines(sent: Entities) -> None:
-    """The centreline, the twisting axis, and the way of the free points up to the present."""
+    """The centreline, the twisting axis, and the path of the free points up to the present."""
     motion = sent.motion
     closed = np.concatenate([motion.x, motion.x[:, :1]], axis=1).astype(np.float32)
     send_strips(sent, "ring/centreline", list(closed), INK, 0.004)

@@ -12,8 +12,8 @@ from der.records.energy_surface import Surface
 from der.records.landscape import Landscape, Rest
 from der.utils.checks import Array
 from der.viz.animation import Motion, middles
-from der.viz.rerun.axes import PlotAxes
-from der.viz.rerun.curves import send_axes, send_curve, send_labels
+from der.viz.rerun.axes import PlotAxes, send_axes, send_labels
+from der.viz.rerun.curves import send_curve
 from der.viz.rerun.entities import CHALK, INK, ORANGE, SKY, VERMILION, Entities
 from der.viz.ribbon import viridis
 
@@ -27,7 +27,7 @@ COLOURS = {"well": SKY, "saddle": VERMILION}
 
 
 def send_landscape(sent: Entities, landscape: Landscape) -> None:
-    """U over gamma with all branches, rests and barriers; where there is one, the well larger."""
+    """U over gamma with M = 0 states and barriers; beside it, larger, the folded well."""
     path, found = landscape.path, landscape.barriers
     whole = PlotAxes(path.gamma, path.energy)
     _send_part(sent, landscape, "landscape/whole", whole)
@@ -46,7 +46,7 @@ def send_landscape(sent: Entities, landscape: Landscape) -> None:
 
 
 def well(landscape: Landscape) -> PlotAxes:
-    """The panel of the saddle and the folded ring's well, which are small beside the way up.
+    """The axes of the saddle and the folded ring's well, which are small beside the barrier.
 
     The landscape must have a barrier to open the ring.
     """
@@ -65,23 +65,23 @@ def well(landscape: Landscape) -> PlotAxes:
     )
 
 
-def _send_part(sent: Entities, landscape: Landscape, entity: str, panel: PlotAxes) -> None:
-    """A panel of it, with its rests."""
-    send_axes(sent, entity, panel)
-    send_curve(sent, landscape.path, "energy", panel=panel, entity=entity)
+def _send_part(sent: Entities, landscape: Landscape, entity: str, axes: PlotAxes) -> None:
+    """Axes of it, with its M = 0 states."""
+    send_axes(sent, entity, axes)
+    send_curve(sent, landscape.path, "energy", axes=axes, entity=entity)
     for kind, colour in COLOURS.items():
         rests = [rest for rest in landscape.rests if rest.kind == kind]
-        places = panel.place([r.gamma for r in rests], [r.energy for r in rests]).reshape(-1, 2)
-        shown = panel.holds(places)
-        words = [kind for _ in rests]
-        if panel.window is not None:
-            words = [f"{kind}, U = {round(rest.energy, 9) + 0.0:.4g}" for rest in rests]
+        places = axes.place([r.gamma for r in rests], [r.energy for r in rests]).reshape(-1, 2)
+        shown = axes.holds(places)
+        texts = [kind for _ in rests]
+        if axes.window is not None:
+            texts = [f"{kind}, U = {round(rest.energy, 9) + 0.0:.4g}" for rest in rests]
         if shown.any():
             points = rr.Points2D(
                 places[shown],
                 colors=colour,
                 radii=2.0,
-                labels=[word for word, there in zip(words, shown, strict=True) if there],
+                labels=[text for text, there in zip(texts, shown, strict=True) if there],
                 show_labels=True,
                 draw_order=40.0,
             )
@@ -89,13 +89,13 @@ def _send_part(sent: Entities, landscape: Landscape, entity: str, panel: PlotAxe
 
 
 def _send_barrier(
-    sent: Entities, entity: str, panel: PlotAxes, low: Rest, high: Rest, share: float, text: str
+    sent: Entities, entity: str, axes: PlotAxes, low: Rest, high: Rest, share: float, text: str
 ) -> None:
     """A level through the upper rest, and an arrow up to it from the lower one's level."""
-    gamma = panel.gamma[0] + share * (panel.gamma[1] - panel.gamma[0])
-    foot, top = panel.place([gamma, gamma], [low.energy, high.energy])
-    level = panel.place([gamma, high.gamma], high.energy)
-    base = panel.place([gamma, low.gamma], low.energy)
+    gamma = axes.gamma[0] + share * (axes.gamma[1] - axes.gamma[0])
+    foot, top = axes.place([gamma, gamma], [low.energy, high.energy])
+    level = axes.place([gamma, high.gamma], high.energy)
+    base = axes.place([gamma, low.gamma], low.energy)
     sent.still(f"{entity}/levels", rr.LineStrips2D([level, base], colors=CHALK, radii=0.25))
     arrow = rr.Arrows2D(origins=[foot], vectors=[top - foot], colors=CHALK, radii=0.5)
     sent.still(f"{entity}/height", arrow)
@@ -126,7 +126,7 @@ class Box:
 
 
 def send_surface(sent: Entities, surface: Surface) -> None:
-    """The least energy as a surface, coloured by it; the path, folds, rests, snaps; and now."""
+    """The least energy as a surface, with the path, its special points, and the present state."""
     ceiling = CEILING * float(np.nanmax(surface.path[:, 2]))
     ends = [(float(v[0]), float(v[-1])) for v in (surface.gamma, surface.distance)]
     box = Box(ends[0], ends[1], ceiling)
@@ -194,21 +194,21 @@ def _send_relief(sent: Entities, surface: Surface, box: Box) -> None:
 
 
 def _send_box(sent: Entities, box: Box) -> None:
-    """Edges of the box at its foot, and ticks in words."""
+    """Edges of the box at its foot, and ticks as texts."""
     x, y, z = (np.array([-0.5, 0.5]) * side for side in SIDES)
     foot = [[x[0], y[0], z[0]], [x[1], y[0], z[0]], [x[1], y[1], z[0]], [x[0], y[1], z[0]]]
     lines = [[*foot, foot[0]], [foot[0], [x[0], y[0], z[1]]]]
     sent.still("surface/axes", rr.LineStrips3D(lines, colors=(150, 150, 150), radii=0.004))
-    places, words = [], []
+    places, texts = [], []
     for share in (0.0, 0.5, 1.0):
         turn = box.gamma[0] + share * (box.gamma[1] - box.gamma[0])
         places.append([x[0] + share * SIDES[0], y[0] - 0.12, z[0]])
-        words.append(f"{turn / math.pi:.2g} π" if share != 0.5 else "gamma")
+        texts.append(f"{turn / math.pi:.2g} π" if share != 0.5 else "gamma")
         away = box.distance[0] + share * (box.distance[1] - box.distance[0])
         places.append([x[1] + 0.12, y[0] + share * SIDES[1], z[0]])
-        words.append(f"{away:.2g} a" if share != 0.5 else "distance of the grips")
+        texts.append(f"{away:.2g} a" if share != 0.5 else "distance of the grips")
     for share in (0.5, 1.0):
         places.append([x[0] - 0.08, y[0], z[0] + share * SIDES[2]])
-        words.append(f"U = {share * box.ceiling:.3g}")
-    points = rr.Points3D(places, labels=words, radii=0.001, colors=PALE, show_labels=True)
+        texts.append(f"U = {share * box.ceiling:.3g}")
+    points = rr.Points3D(places, labels=texts, radii=0.001, colors=PALE, show_labels=True)
     sent.still("surface/values", points)

@@ -1,7 +1,7 @@
-"""A path as a motion to scrub through: a rerun recording, in a file or served while it is made.
+"""A path as a recording for the rerun viewer, in a file or served while the path is solved.
 
-A recording is made in memory, column by column, once the path is known, and written whole or not
-at all. The main timeline is `step`, the steps of the motion; since gamma turns back at folds,
+A recording is made in memory, column by column, once the path is known, and written
+atomically. The main timeline is `step`, the steps of the motion; since gamma turns back at folds,
 `gamma_mdeg` (millidegrees) is the second one.
 """
 
@@ -23,16 +23,9 @@ from der.utils.files import FilePath
 from der.viz.animation import Motion, animate
 from der.viz.captions import about
 from der.viz.files import checked_suffix, write
-from der.viz.rerun.axes import HIGH, PlotAxes
+from der.viz.rerun.axes import HIGH, PlotAxes, send_axes, send_labels
 from der.viz.rerun.blueprint import SOLVING, UNDER, beside, landscape_layout, layout, while_solving
-from der.viz.rerun.curves import (
-    send_axes,
-    send_curve,
-    send_events,
-    send_key,
-    send_labels,
-    send_series,
-)
+from der.viz.rerun.curves import send_curve, send_events, send_key, send_series
 from der.viz.rerun.entities import PAIR, VERMILION, Entities, send_ring
 from der.viz.rerun.landscape import send_landscape, send_surface
 from der.viz.resampling import in_step, one_or_two
@@ -46,7 +39,7 @@ STEPS = 240  # of two motions side by side
 def save_recording(
     path: Path | Sequence[Path], file: FilePath, *, rest: Array | None = None
 ) -> None:
-    """Write the recording of a path, or of two beside each other, whole or not at all.
+    """Write the recording of a path, or of two beside each other, atomically.
 
     Parameters
     ----------
@@ -120,7 +113,7 @@ def recording_bytes(path: Path | Sequence[Path], *, rest: Array | None = None) -
 class Live:
     """A recording that is served for watching while the path is solved; a context.
 
-    `show` gives it the states one by one, on a timeline of their own; `finish` the whole motion.
+    `show` gives it the states one by one, on a timeline of their own; `finish` all of the path.
 
     Raises
     ------
@@ -145,7 +138,7 @@ class Live:
         self._shown += 1
 
     def finish(self, path: Path) -> None:
-        """Show the motion of a path; errors as in `animate`."""
+        """Show all of a path; errors as in `animate`."""
         motion = animate(path)
         self._stream.reset_time()
         self._stream.send_recording_name(names([path])[0])
@@ -195,7 +188,7 @@ def _send(stream: rr.RecordingStream, path: Path, motion: Motion) -> None:
 def _send_both(
     stream: rr.RecordingStream, paths: Sequence[Path], motions: Sequence[Motion]
 ) -> None:
-    """Send two motions on one timeline: rings beside each other, curves in the same panels."""
+    """Send two motions on one timeline: rings beside each other, curves in the same axes."""
     called = names(paths)
     stream.send_blueprint(beside(motions, called))
     top = max(motion.top for motion in motions)
@@ -209,10 +202,10 @@ def _send_both(
         gamma, heights = (
             np.concatenate([getattr(path, n) for path in paths]) for n in ("gamma", name)
         )
-        panel = PlotAxes(gamma, heights)
-        send_axes(common, f"curves/{name}", panel)
+        axes = PlotAxes(gamma, heights)
+        send_axes(common, f"curves/{name}", axes)
         for k, (sent, path, colour) in enumerate(zip(both, paths, PAIR, strict=True)):
-            send_curve(sent, path, name, panel=panel, colour=colour)
+            send_curve(sent, path, name, axes=axes, colour=colour)
             place = [[75.0, -HIGH - 12.0 + 7.0 * k]]
             send_labels(sent, f"curves/{name}/name", place, [called[k]], colour=colour)
     for sent, path, name, colour in zip(both, paths, called, PAIR, strict=True):
