@@ -32,8 +32,8 @@ WAYS: dict[str, dict[str, object]] = {
     "angle, up and down": {"control": "angle", "unload": True},
     "moment": {"control": "moment"},
 }
-# what the ring does, and not that the solver has failed; "" until marches give their reason
-ANSWERS = (Reason.BREAKS_SYMMETRY.word, Reason.TURNED_BACK.word, "")
+# what the ring does, and not that the solver has failed
+ANSWERS = (Reason.BREAKS_SYMMETRY.word, Reason.TURNED_BACK.word)
 LOOSE = 1e-3  # of U: what the work between states is known to by interpolation
 DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt
 

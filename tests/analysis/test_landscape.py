@@ -17,6 +17,7 @@ from der.analysis.landscape.barrier import barrier
 from der.analysis.landscape.landscape import landscape
 from der.analysis.landscape.over_thickness import barriers_over
 from der.analysis.landscape.surface import energy_surface
+from der.analysis.request import Request
 from der.records.energy_surface import Surface
 from der.records.landscape import BarrierCurves, Landscape, Pass
 from der.viz.plots.style import save
@@ -150,6 +151,22 @@ def test_ctrl_c_keeps_the_surface_so_far():
     assert 0 < empty.sum() < empty.size
     assert len(one.reasons) == empty.sum()
     assert "stopped" in one.reasons[0].why
+
+
+def test_ctrl_c_on_the_way_fills_no_cells(monkeypatch):
+    """Pressed while the path is followed: it is kept, and nothing is computed from it."""
+    follow = Request.follow
+
+    def pressed(*given, **more):
+        for k, point in enumerate(follow(*given, **more)):
+            if k == 5:
+                signal.raise_signal(signal.SIGINT)
+            yield point
+
+    monkeypatch.setattr(Request, "follow", pressed)
+    one = energy_surface(scene(4.0), shape=(12, 12))
+    assert (one.status, len(one.path), len(one.snaps)) == ("interrupted", 6, 0)
+    assert one.count.sum() == 0
 
 
 def test_cells_beyond_reach_have_a_reason():
