@@ -118,7 +118,7 @@ def test_a_circle_is_divided_evenly():
 
 @pytest.mark.parametrize("shape", ["rectangle x", "triangle 90", "triangle 120", "triangle 60"])
 def test_cells_share_the_curvature_of_the_flat_and_the_folded_ring(shape):
-    """Integrals of |k1u| + 4 pi/L over cells are alike, up to whole cells of a segment.
+    """Integrals of |k1u| + 4 pi/L over cells are alike, but for rounding to a number of cells.
 
     Segments have two cells or more at the coarsest level: one more or less changes a share by half.
     """
