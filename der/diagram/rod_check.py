@@ -11,9 +11,9 @@ import numpy as np
 
 from der.diagram.cases import Row, failed, row_of
 from der.diagram.scan import Node, Scan, corners
-from der.paper.cases import Array
 from der.records.path import Path
 from der.scene import Scene
+from der.utils.checks import Array
 
 Fold: TypeAlias = Callable[[Scene], Path]
 
