@@ -97,16 +97,18 @@ def test_an_unknown_name_is_refused_like_any_attribute():
 
 def test_scene_and_rod_mean_the_same_measures():
     """scene.MEASURES are the measures that rod() takes, by the number that kernels read."""
-    from der.rod.rod import rod
+    from der.rod.rod import discrete_rod
     from der.scene import MEASURES
 
-    bodies = [rod(np.ones(3), np.zeros(3), (1.0, 1.0, 1.0), measure=name) for name in MEASURES]
-    assert [body.measure for body in bodies] == list(range(len(MEASURES)))
+    rods = [
+        discrete_rod(np.ones(3), np.zeros(3), (1.0, 1.0, 1.0), measure=name) for name in MEASURES
+    ]
+    assert [rod.measure for rod in rods] == list(range(len(MEASURES)))
 
 
 def test_rod_refuses_a_measure_that_scene_does_not_know():
     """And no other."""
-    from der.rod.rod import rod
+    from der.rod.rod import discrete_rod
 
     with pytest.raises(ValueError, match="curvature must be one of logarithm, angle, tangent"):
-        rod(np.ones(3), np.zeros(3), (1.0, 1.0, 1.0), measure="sine")
+        discrete_rod(np.ones(3), np.zeros(3), (1.0, 1.0, 1.0), measure="sine")

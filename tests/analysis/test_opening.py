@@ -20,13 +20,14 @@ from der.continuation.arclength import follow
 from der.continuation.events import Events
 from der.continuation.richardson import limit
 from der.kernels.assembly import assemble
-from der.kernels.forces import Motion, gradient, no_pull
+from der.kernels.forces import Motion, gradient
 from der.kernels.quaternions import rotation
 from der.records.opening import LeastPush
 from der.records.text import summary
-from der.rod.relaxation import relax
+from der.rod.relaxation import _no_pull, relax
 from der.rod.rod import State, discrete_rod, edges, strains
 from der.rod.supports import supported
+from der.utils.run import Run
 from der.viz.plots.opening import EVENTS, draw
 
 ALIKE = 1e-5  # GJ/a
@@ -150,7 +151,7 @@ def test_forces_of_a_load_that_lengthens_edges(block):
         np.zeros((5, block)),
         np.zeros(1),
     )
-    pull = no_pull(supports)
+    pull = _no_pull(supports)
     gradient(rod, supports, motion, pull)
     system = derivatives(rod, supports, state.but(force=np.zeros(3)))
     assert_allclose(pull.grad, system.grad, rtol=0, atol=1e-13)
@@ -357,8 +358,8 @@ def test_the_search_goes_on_between_the_points_of_its_grid():
     rests, free, _, _ = twisted_rests(ellipse)
     for barrier_there, expected in ((1.0, (5, 17)), (5.0, (4, 16))):
         search = Bowl(ellipse, free[-1], {"folded": rests[-1].energy}, math.inf)
-        scan(search, 12, [], None)
-        refine(search, 4, barrier_there, [])
+        scan(search, 12, Run(), None)
+        refine(search, 4, barrier_there, Run())
         best, _ = search.all[search.least(dead=False)["force"]]
         assert best.edges == expected
     assert len(search.found) < 12 * 11 / 2 / 2
