@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # which takes long to load
     from der.records.path import Path
 
-STOPPED = "stopped by the user"
-
 
 class Reason(Enum):
     """Why a solve, a step or a path ended; the value is advice for the reader, never parsed."""
@@ -30,7 +28,7 @@ class Reason(Enum):
     TURNED_BACK = (
         "gamma turns back before gamma_max, and the path runs to -gamma_max without arriving"
     )
-    INTERRUPTED = STOPPED
+    INTERRUPTED = "stopped by the user"
 
     @property
     def word(self) -> str:

@@ -19,7 +19,7 @@ from der.analysis.path_record import (
     state_at_pi,
 )
 from der.analysis.request import LOOSE_TURN, Request, ring_of
-from der.errors import Interrupted, NotConverged, Reason
+from der.errors import Reason
 from der.geometry.section import section
 from der.geometry.shapes import circle
 from der.kernels.quaternions import Array
@@ -84,11 +84,7 @@ def fold(
         if run.done and scene.error_bars:
             found = run.attempt(partial(found.extrapolated, request)) or found
         path = found.record(run, statistics)
-    if run.status == "interrupted":
-        raise Interrupted(run.marked(path))
-    if run.status == "not converged":
-        raise NotConverged(run.message, path)
-    return path
+    return run.answer(path)
 
 
 def _request(scene: Scene) -> Request:

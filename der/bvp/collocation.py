@@ -60,6 +60,21 @@ class Solution(NamedTuple):
         return Direction(self.frames, self.p, self.gamma)
 
     @property
+    def parameter(self) -> float:
+        """Gamma, as continuation calls it."""
+        return self.gamma
+
+    @property
+    def parameter_rate(self) -> float:
+        """Rate of gamma along the tangent; it vanishes at a fold."""
+        return self.tangent.gamma
+
+    @property
+    def observables(self) -> dict[str, tuple[float, float]]:
+        """The moment, and its rate along the tangent."""
+        return {"moment": (self.moment, self.moment_rate)}
+
+    @property
     def slope(self) -> float:
         """dM/dgamma, from the linearised problem."""
         return self.moment_rate / self.tangent.gamma

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from der.records import path as records
 from der.records.configurations import Shapes
 from der.records.path import AtPi, Mode, Path, Timing, folding_mode, release
 from der.scene import Scene
-from der.utils.checks import counts
+from der.utils.run import Run
 
 FLAT = 1e-6  # out-of-plane extent of a folded ring, a
 HOW = (
@@ -47,48 +48,47 @@ class Followed:
         extent = 2.0 * float(np.abs(at.places[:, 0]).max())
         return extent < FLAT and abs(turning(self.system, at) - 6.0 * math.pi) < 0.1
 
-    def record(self, timing: Timing, status: str, message: str, reason: Reason | None) -> Path:
+    def record(self, run: Run) -> Path:
         """Return the record of the path."""
-        solutions = [point.solution for point in self.points]
-        gamma, moment, energy = (
-            np.array([getattr(at, name) for at in solutions])
-            for name in ("gamma", "moment", "energy")
-        )
-        special = tuple(
-            records.Point(p.kind, at.gamma, at.moment, at.energy, None, None, k)
-            for k, (p, at) in enumerate(zip(self.points, solutions, strict=True))
-            if p.kind
-        )
-        at_pi, mode = self._judged(gamma, moment, special)
-        if reason is Reason.TURNED_BACK and float(gamma.max()) < math.pi:
-            mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
-        unknown = counts("index", [None] * len(solutions))
-        error = {
-            name: [float(getattr(point.error, name)) for point in self.points]
-            for name in ("gamma", "moment", "energy")
+        scene, cost = self.scene, self.statistics
+        values: dict[str, Any] = {
+            name: np.array([getattr(point.solution, name) for point in self.points])
+            for name in records.NUMBERS
         }
+        errors = {
+            name: [float(getattr(point.error, name)) for point in self.points]
+            for name in records.NUMBERS
+        }
+        special = tuple(
+            records.Point(one.kind, at.gamma, at.moment, at.energy, None, None, k)
+            for k, one in enumerate(self.points)
+            for at in (one.solution,)
+            if one.kind
+        )
+        at_pi, mode = self._at_pi(values["gamma"], values["moment"], special)
+        if run.reason is Reason.TURNED_BACK and at_pi is None:
+            mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
+        unknown = records.counts([None] * len(self.points))
         return Path(
             solver="bvp",
-            ring=self.scene.ring.to_json(),
-            section=asdict(self.scene.section),
+            ring=scene.ring.to_json(),
+            section=asdict(scene.section),
             numerics=self._numerics(),
-            gamma=gamma,
-            moment=moment,
-            energy=energy,
+            **values,
             index=unknown,
             index_moment=unknown,
             points=special,
             at_pi=at_pi,
             mode=mode,
-            error=error | {"how": HOW},
-            timing=timing,
-            shapes=self._shapes() if self.scene.shapes and solutions else None,
-            status=status,
-            message=message,
-            reason="" if reason is None else reason.word,
+            error={**errors, "how": HOW},
+            timing=Timing(run.seconds, cost.newton_iterations, cost.steps),
+            shapes=self._shapes() if scene.shapes and self.points else None,
+            status=run.status,
+            message=run.message,
+            reason="" if run.reason is None else run.reason.word,
         )
 
-    def _judged(
+    def _at_pi(
         self, gamma: Array, moment: Array, special: tuple[records.Point, ...]
     ) -> tuple[AtPi | None, Mode | None]:
         """The state at the first arrival at pi, and the folding mode; None where there is none."""
@@ -97,10 +97,8 @@ class Followed:
         k = int(np.argmax(gamma == math.pi))
         at = self.points[k].solution
         at_pi = AtPi(at.moment, at.slope, at.energy, None, None, None)
-        before = tuple(point for point in special if point.position <= k)
-        mode = folding_mode(
-            gamma[: k + 1], moment[: k + 1], before, at_pi, three_covered=self.three_covered(at)
-        )
+        folded = self.three_covered(at)
+        mode = folding_mode(gamma[: k + 1], moment[: k + 1], special, at_pi, three_covered=folded)
         return at_pi, mode
 
     def _numerics(self) -> dict[str, object]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from functools import cache
 
@@ -13,13 +12,13 @@ from der.bvp.events import Point, Wanted
 from der.bvp.record import Followed
 from der.bvp.sectors import sector
 from der.bvp.step import Statistics
-from der.errors import STOPPED, ContinuationFailed, Interrupted, NotConverged, Reason
+from der.errors import Reason
 from der.geometry.section import section
 from der.geometry.shapes import circle
-from der.records.path import Path, Timing
+from der.records.path import Path
 from der.scene import Scene
 from der.utils.checks import checked_number
-from der.utils.interrupts import interrupts_between_states
+from der.utils.run import Run
 
 TOLERANCE = 1e-8
 FINEST, COARSEST = 1e-11, 1e-3
@@ -69,34 +68,20 @@ def solve_with_points(
     """`solve_bvp`, and the points with their solutions."""
     check(scene, tolerance)
     followed = Followed(scene, collocation(sector(scene)), tolerance)
-    statistics = followed.statistics
-    with interrupts_between_states() as pressed:
-        _load_kernels(followed.system.sector.piece.quarter)
-        started = time.perf_counter()
+    points = followed.points
 
-        def record(status: str, message: str = "", reason: Reason | None = None) -> Path:
-            seconds = time.perf_counter() - started
-            timing = Timing(seconds, statistics.newton_iterations, statistics.steps)
-            return followed.record(timing, status, message, reason)
+    def tell(point: Point) -> None:
+        if progress is not None:
+            progress(point.solution.gamma)
 
-        try:
-            for point in follow(followed.system, _wanted(followed), statistics):
-                followed.points.append(point)
-                if progress is not None:
-                    progress(point.solution.gamma)
-                if pressed:
-                    raise KeyboardInterrupt
-        except ContinuationFailed as failed:
-            path = record("not converged", str(failed), failed.reason)
-            raise NotConverged(str(failed), path) from None
-        except KeyboardInterrupt:
-            pressed.clear()  # one more must not lose what there is
-            raise Interrupted(record("interrupted", STOPPED, Reason.INTERRUPTED)) from None
-        back = (Reason.TURNED_BACK.value, Reason.TURNED_BACK)
-        path = record("done", *(back if followed.turned_back else ()))
-        if pressed:  # while the record was made
-            raise Interrupted(path.interrupted())
-    return path, followed.points
+    with Run() as run:
+        run.prepare(lambda: _load_kernels(followed.system.sector.piece.quarter))
+        wanted = _wanted(followed)
+        points += run.collect(follow(followed.system, wanted, followed.statistics), tell)
+        if run.done and followed.turned_back:
+            run.note(Reason.TURNED_BACK)
+        path = followed.record(run)
+    return run.answer(path), points
 
 
 def _wanted(followed: Followed) -> Wanted:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from der.bvp.collocation import Collocation, Direction, Solution, required
+from der.bvp.gauss import Array
 from der.bvp.meshes import Mesh
 from der.continuation.roots import find_root
 from der.errors import ContinuationFailed
@@ -68,6 +69,11 @@ class Step:
         h10, h01, h11 = self._weights(s)
         start = self.start.unknowns.plus(h10, self.start.tangent)
         return start.plus(h01, self.jump).plus(h11, self.end.tangent)
+
+    @property
+    def end_rate(self) -> Array:
+        """Rate of gamma by s at the end."""
+        return np.array([self.end.tangent.gamma / self.cosine])
 
     @property
     def angle(self) -> float:

@@ -82,7 +82,7 @@ class _Path(Generic[S]):
                 )
             step = self._advance(here.solution, before, length)
             try:
-                found, ended = located(self.system, self.events, step, here)
+                found, ended = located(self.events, step, here)
             except ContinuationFailed:
                 # both ends are equilibria, but not of one smooth curve: look again from closer
                 if step.length < 4.0 * options.smallest_step:

@@ -18,10 +18,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Generic, NamedTuple, Protocol
+from typing import Any, Generic, NamedTuple, Protocol, cast
 
 from der.continuation.bifurcations import Change, Counting, is_fold, merged, own_changes
-from der.continuation.extrema import Found, extrema, of_observable, of_parameter
+from der.continuation.extrema import Curve, Found, extrema, of_observable, of_parameter
 from der.continuation.step import SAME, Step
 from der.errors import ContinuationFailed, Reason
 from der.problem import Indices, Point, S, Solution, Stability, System
@@ -91,14 +91,15 @@ def _stable(system: System[S]) -> Stability[S]:
     return system  # type: ignore[return-value]
 
 
-def located(
-    system: System[S], events: Events[S], step: Step[S], here: Point[Any]
-) -> tuple[list[Point[Any]], bool]:
-    """Return the points after ``here`` in ``step``, and whether the path ends with them."""
+def located(events: Events[Any], step: Curve, here: Point[Any]) -> tuple[list[Point[Any]], bool]:
+    """Return the points after ``here`` in ``step``, and whether the path ends with them.
+
+    The index and further events need a `Step`; for the others any curve of solutions will do.
+    """
     folds = _folds(step)
-    marks, ended = _at_targets(system, events, step, folds)
+    marks, ended = _at_targets(events, step, folds)
     if not ended:
-        marks.append(Mark(step.length, regular(system, events, step.end)))
+        marks.append(Mark(step.length, regular(step.system, events, step.end)))
     end = marks[-1].s
     marks += [Mark(s, Point(at, "fold")) for s, at in folds if s < end]
     line = sorted([Mark(0.0, here), *marks], key=lambda m: m.s)
@@ -106,13 +107,13 @@ def located(
         line += _limits(step, line, name)
         line.sort(key=lambda m: m.s)
     for event in events.further:
-        line = event.located(step, line, ended=ended)
+        line = event.located(cast(Step[Any], step), line, ended=ended)
     if events.stability:  # the index at further events is a sample, too
-        line = _Stability(_stable(system), events, step).located(line)
+        line = _Stability(step.system, events, cast(Step[Any], step)).located(line)
     return [m.point for m in line[1:]], ended
 
 
-def _folds(step: Step[Any]) -> list[Found]:
+def _folds(step: Curve) -> list[Found]:
     """Folds of the parameter within a step, also a pair of them between tangents of equal sign."""
 
     def along(at: Solution[Any]) -> tuple[float, float]:
@@ -122,9 +123,7 @@ def _folds(step: Step[Any]) -> list[Found]:
     return extrema(step, (0.0, step.start), (step.length, step.end), of_parameter, along)
 
 
-def _at_targets(
-    system: System[S], events: Events[S], step: Step[S], folds: list[Found]
-) -> tuple[list[Mark], bool]:
+def _at_targets(events: Events[Any], step: Curve, folds: list[Found]) -> tuple[list[Mark], bool]:
     """Solutions at the targets, in order, up to the end of the path if it lies in this step."""
     cuts = [(0.0, step.start), *folds, (step.length, step.end)]
     marks: list[Mark] = []
@@ -133,13 +132,13 @@ def _at_targets(
             s, at = (s1, b) if value == b.parameter else step.at_parameter(value, s0, s1)
             if marks:  # values may lie closer than places can be told
                 s = max(s, marks[-1].s)
-            marks.append(Mark(s, regular(system, events, at)))
+            marks.append(Mark(s, regular(step.system, events, at)))
             if events.stop is not None and events.stop(at):
                 return marks, True
     return [m for m in marks if m.s < step.length], False
 
 
-def _limits(step: Step[Any], line: list[Mark], name: str) -> list[Mark]:
+def _limits(step: Curve, line: list[Mark], name: str) -> list[Mark]:
     """Extrema of an observable between the marks of a line."""
     value = of_observable(name)
     return [

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from der.continuation.roots import ROOT, least_rate, rate_of_cubic, root_of_rate
-from der.continuation.step import SAME, Step
-from der.problem import Solution
+from der.continuation.step import SAME
+from der.problem import Increment, Solution
 
 _AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way
 _ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
@@ -22,6 +22,45 @@ _HALVED = 0.25  # of what it was wrong by: on a part of the interval
 
 Found: TypeAlias = tuple[float, Solution[Any]]  # a place, and the solution there
 Value: TypeAlias = Callable[[Solution[Any]], tuple[float, float]]  # and its rate along the path
+
+
+class Curve(Protocol):
+    """A curve of solutions, s in [0, length]: what the search for events needs of a step."""
+
+    @property
+    def system(self) -> Any:
+        """What the solutions are of."""
+
+    @property
+    def start(self) -> Any:
+        """Solution at s = 0."""
+
+    @property
+    def end(self) -> Any:
+        """Solution at s = length."""
+
+    @property
+    def end_rate(self) -> Increment:
+        """Rate by s at the end, that of the parameter last."""
+
+    @property
+    def length(self) -> float:
+        """Largest s."""
+
+    def at(self, s: float) -> Any:
+        """Return the solution at ``s``."""
+
+    def at_parameter(self, value: float, low: float, high: float) -> tuple[float, Any]:
+        """Return place and solution at a parameter that is monotonic between two places."""
+
+    def change(
+        self,
+        value: Callable[[Any], float],
+        low: tuple[float, Any],
+        high: tuple[float, Any],
+        guess: float | None = None,
+    ) -> tuple[float, Any]:
+        """Return place and solution, between two, where ``value`` changes its sign."""
 
 
 def of_parameter(at: Solution[Any]) -> tuple[float, float]:
@@ -35,7 +74,7 @@ def of_observable(name: str) -> Value:
 
 
 def extrema(
-    step: Step[Any], low: Found, high: Found, value: Value, along: Value | None = None
+    step: Curve, low: Found, high: Found, value: Value, along: Value | None = None
 ) -> list[Found]:
     """Return places between two, and their solutions, where a value turns back.
 
@@ -51,7 +90,7 @@ def extrema(
     ]
 
 
-def _extremum(step: Step[Any], low: Found, high: Found, value: Value) -> Found:
+def _extremum(step: Curve, low: Found, high: Found, value: Value) -> Found:
     """The place between two, and its solution, where a ``value`` turns: its rate changes sign."""
     u = root_of_rate(*_rate(low, high, value))
     guess = None if u is None else low[0] + u * (high[0] - low[0])
@@ -66,7 +105,7 @@ def _rate(low: Found, high: Found, value: Value) -> tuple[float, float, float]:
 
 
 def _samples(
-    step: Step[Any], low: Found, high: Found, value: Value, off: float | None = None
+    step: Curve, low: Found, high: Found, value: Value, off: float | None = None
 ) -> list[Found]:
     """Two places, and those between that tell whether the rate of a value changes sign there.
 
@@ -100,7 +139,7 @@ def _samples(
     return [*before, *_samples(step, middle, high, value, off)[1:]]
 
 
-def _bisected(step: Step[Any], places: list[Found], value: Value) -> list[Found]:
+def _bisected(step: Curve, places: list[Found], value: Value) -> list[Found]:
     """Places with one more wherever a value changes against its rates at two of them.
 
     In between the rate has the other sign, on however short a stretch: by bisection. In a ring

@@ -8,7 +8,7 @@ where it enters, by name. Angles in radians, moments in GJ/a, energies of the fu
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any, ClassVar
@@ -209,11 +209,6 @@ class Path(Record):
 
     def _of_kind(self, kind: str) -> tuple[Point, ...]:
         return tuple(point for point in self.points if point.kind == kind)
-
-    def interrupted(self) -> Path:
-        """The same path as one that the user stopped."""
-        why = Reason.INTERRUPTED
-        return replace(self, status="interrupted", message=why.value, reason=why.word)
 
 
 def folding_mode(

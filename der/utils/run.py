@@ -12,10 +12,13 @@ from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from dataclasses import replace
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from der.errors import ContinuationFailed, Reason
+from der.errors import ContinuationFailed, Interrupted, NotConverged, Reason
 from der.utils.interrupts import interrupts_between_states
+
+if TYPE_CHECKING:
+    from der.records.path import Path
 
 T = TypeVar("T")
 R = TypeVar("R", bound=Any)
@@ -78,6 +81,20 @@ class Run:
         """Do what does not count as time of the analysis, such as loading kernels."""
         self.attempt(work)
         self.started = time.perf_counter()
+
+    def answer(self, path: Path) -> Path:
+        """Return the record of a path that was followed to its end.
+
+        Raises
+        ------
+        Interrupted, NotConverged
+            With the path so far.
+        """
+        if self.status == "interrupted":
+            raise Interrupted(self.marked(path))
+        if self.status == "not converged":
+            raise NotConverged(self.message, path)
+        return path
 
     def marked(self, record: R) -> R:
         """Return a record with the status that the analysis has come to by now."""

@@ -100,7 +100,7 @@ def test_two_changes_of_an_index_within_one_step_are_found():
     assert len(changes) == 2
     request = Request(targets=(), self_crossings=False)
     here = request.point(ring, step.start)
-    found, _ = located(ring, request.events(ring), step, here)
+    found, _ = located(request.events(ring), step, here)
     pair = [one for one in found if one.kind == "branch"]
     assert [one.details["symmetry"] for one in pair] == ["out of phase"] * 2
     for one, k in zip(pair, changes, strict=True):
