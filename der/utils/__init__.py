@@ -1,5 +1,5 @@
-"""Checks of arguments, whole-file writing, interrupts: used by all.
+"""Checks of arguments, files written completely or not at all, interrupts, the run loop of analyses.
 
-May import nothing of der.
-Begin with checks.py.
+May import errors only; all others may import it.
+Begin with checks.py and run.py.
 """
