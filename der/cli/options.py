@@ -80,7 +80,29 @@ class RingOptions:
 
     def section(self) -> Section:
         """The section that the command line describes."""
-        return _section(self.h_over_t, self.alpha, self.beta, self.nu)
+        from der.geometry.section import rectangular_section, section
+
+        h_over_t, alpha, beta, nu = self.h_over_t, self.alpha, self.beta, self.nu
+        if h_over_t is None and nu != NU:
+            raise ValueError(f"nu can only be given together with --h-over-t, got {nu}")
+        if h_over_t is not None:
+            if alpha is not None or beta is not None:
+                raise ValueError(
+                    f"h_over_t cannot be given together with --alpha and --beta, got {h_over_t}"
+                )
+            try:
+                return rectangular_section(h_over_t, nu)
+            except ValueError as wrong:
+                if str(wrong).startswith(("alpha", "beta")):  # not what the user gave
+                    raise ValueError(f"h_over_t is too extreme: {wrong} for {h_over_t}") from None
+                raise
+        if alpha is None and beta is None:
+            raise ValueError("h_over_t (or both --alpha and --beta) must be given, got neither")
+        if alpha is None:
+            raise ValueError(f"alpha must be given together with --beta {beta}, got none")
+        if beta is None:
+            raise ValueError(f"beta must be given together with --alpha {alpha}, got none")
+        return section(alpha, beta)
 
 
 @dataclass(frozen=True)
@@ -107,47 +129,8 @@ class PathOptions:
         """The scene that the command line describes."""
         from der.scene import Scene
 
-        wanted: dict[str, Any] = {
-            "n_edges": self.edges,
-            "sector": self.sector,
-            "stability": self.stability,
-            "error_bars": self.error_bars,
-            "control": self.control,
-            "unload": self.unload,
-            "solver": self.solver,
-            "gamma_max": self.gamma_max,
-            "until": self.until,
-            "save_at": numbers("save_at", self.save_at),
-            "curvature": self.curvature,
-            "stretch": self.stretch,
-            "a_over_t": ring.a_over_t,
-        }
-        if self.tolerance is not None:
-            wanted["tolerance"] = self.tolerance
+        wanted: dict[str, Any] = {n: v for n, v in vars(self).items() if v is not None}
+        wanted["n_edges"] = wanted.pop("edges")
+        wanted["save_at"] = numbers("save_at", self.save_at)
+        wanted["a_over_t"] = ring.a_over_t
         return Scene(ring.ring(), ring.section(), **wanted | more)
-
-
-def _section(h_over_t: float | None, alpha: float | None, beta: float | None, nu: float) -> Section:
-    """The section that the command line describes."""
-    from der.geometry.section import rectangular_section, section
-
-    if h_over_t is None and nu != NU:
-        raise ValueError(f"nu can only be given together with --h-over-t, got {nu}")
-    if h_over_t is not None:
-        if alpha is not None or beta is not None:
-            raise ValueError(
-                f"h_over_t cannot be given together with --alpha and --beta, got {h_over_t}"
-            )
-        try:
-            return rectangular_section(h_over_t, nu)
-        except ValueError as wrong:
-            if str(wrong).startswith(("alpha", "beta")):  # not what the user gave
-                raise ValueError(f"h_over_t is too extreme: {wrong} for {h_over_t}") from None
-            raise
-    if alpha is None and beta is None:
-        raise ValueError("h_over_t (or both --alpha and --beta) must be given, got neither")
-    if alpha is None:
-        raise ValueError(f"alpha must be given together with --beta {beta}, got none")
-    if beta is None:
-        raise ValueError(f"beta must be given together with --alpha {alpha}, got none")
-    return section(alpha, beta)

@@ -87,6 +87,13 @@ def options_named() -> Iterator[None]:
         raise typer.TyperException(" ".join([named, *words])) from None
 
 
+def application(text: str) -> typer.Typer:
+    """A program without commands; ``text`` is its help."""
+    return typer.Typer(
+        help=text, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+    )
+
+
 def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
     """Add a command: a function of groups of options that returns the exit code.
 
