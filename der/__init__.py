@@ -32,10 +32,11 @@ if TYPE_CHECKING:
     from der.geometry.section import Scale, Section, rectangular_section, section
     from der.geometry.shapes import circle, ellipse, profile, rectangle, triangle
     from der.problem import Options
+    from der.records.barriers import BarrierCurves
     from der.records.comparison import ComparedPoint, ComparedState, Comparison
     from der.records.configurations import Shapes
     from der.records.energy_surface import Surface
-    from der.records.landscape import BarrierCurves, Barriers, Landscape, Pass, Rest, Saddle
+    from der.records.landscape import Barriers, Landscape, Pass, Rest, Saddle
     from der.records.opening import Instant, LeastPush, Push
     from der.records.path import AtPi, Mode, Path, Point, Timing
     from der.records.planar import PlanarState, PlanarStates, Squeeze, SqueezePoint
@@ -87,10 +88,11 @@ _NAMES = {  # by the module where they live
     "der.geometry.section": "Scale Section rectangular_section section",
     "der.geometry.shapes": "circle ellipse profile rectangle triangle",
     "der.problem": "Options",
+    "der.records.barriers": "BarrierCurves",
     "der.records.comparison": "ComparedPoint ComparedState Comparison",
     "der.records.configurations": "Shapes",
     "der.records.energy_surface": "Surface",
-    "der.records.landscape": "BarrierCurves Barriers Landscape Pass Rest Saddle",
+    "der.records.landscape": "Barriers Landscape Pass Rest Saddle",
     "der.records.opening": "Instant LeastPush Push",
     "der.records.path": "AtPi Mode Path Point Timing",
     "der.records.planar": "PlanarState PlanarStates Squeeze SqueezePoint",

@@ -11,13 +11,15 @@ from numbers import Integral
 
 from der.geometry.ring import Ring
 from der.geometry.section import Section
-from der.utils.checks import checked_number, one_of, positive, shown, truth
+from der.utils.checks import checked_number, one_of, optional, positive, shown, truth
 
 MEASURES = ("logarithm", "angle", "tangent")  # of curvature, see strain.py
 CONTROLS = ("arclength", "angle", "moment")
 SOLVERS = ("newton", "relaxation")
 STRETCH = ("inextensible", "finite")
 COPIES = {"full": 1, "half": 2, "quarter": 4}  # how many of a sector make the ring
+
+_STATED = (("ring", Ring, "circle()"), ("section", Section, "rectangular_section(4.0)"))
 
 FEWEST_EDGES = 8
 MOST_EDGES = 65_536
@@ -90,34 +92,27 @@ class Scene:
     tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        if not isinstance(self.ring, Ring):
-            raise ValueError(
-                f"ring must be a der.Ring such as der.circle(), got {shown(self.ring)}"
-            )
-        if not isinstance(self.section, Section):
-            raise ValueError(
-                f"section must be a der.Section such as der.rectangular_section(4.0), "
-                f"got {shown(self.section)}"
-            )
-        object.__setattr__(self, "n_edges", _whole("n_edges", self.n_edges))
-        sector_name(self.ring, self.sector, self.n_edges)
+        for name, kind, like in _STATED:
+            if not isinstance(value := getattr(self, name), kind):
+                wanted = f"a der.{kind.__name__} such as der.{like}"
+                raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
+        self._replace("n_edges", _integer)
+        sector = sector_name(self.ring, self.sector, self.n_edges)
         for name in ("stability", "error_bars", "shapes", "history", "modes", "unload"):
-            object.__setattr__(self, name, truth(name, getattr(self, name)))
+            self._replace(name, truth)
         if self.error_bars:
-            meshes(self.n_edges, sector_name(self.ring, self.sector, self.n_edges))
+            meshes(self.n_edges, sector)
         for name in ("history", "modes"):
             if getattr(self, name) and not self.shapes:
                 raise ValueError(f"{name} must come with shapes, got shapes=False")
-        if self.self_crossings is not None:
-            wanted = truth("self_crossings", self.self_crossings)
-            object.__setattr__(self, "self_crossings", wanted)
+        self._replace("self_crossings", optional(truth))
         self._check_control()
         one_of("curvature", self.curvature, MEASURES)
         one_of("stretch", self.stretch, STRETCH)
         if self.until is not None:
             one_of("until", self.until, ("folded",))
         for name in ("gamma_max", "a_over_t", "tolerance"):
-            object.__setattr__(self, name, positive(name, getattr(self, name)))
+            self._replace(name, positive)
         if not 1.0 <= self.a_over_t <= THINNEST:
             raise ValueError(f"a_over_t must be from 1 to {THINNEST:g}, got {self.a_over_t!r}")
         if self.tolerance > 1e-4:
@@ -129,24 +124,23 @@ class Scene:
         if self.save_at is not None:
             self._check_save_at(self.save_at)
 
+    def _replace(self, name: str, check: Callable[[str, object], object]) -> None:
+        """Replace what was given by what a check makes of it."""
+        object.__setattr__(self, name, check(name, getattr(self, name)))
+
     def _check_control(self) -> None:
         one_of("control", self.control, CONTROLS)
         one_of("solver", self.solver, SOLVERS)
-        if self.unload and self.control == "arclength":
-            raise ValueError("unload must come with control 'angle' or 'moment', got 'arclength'")
-        if self.solver == "relaxation" and self.control != "angle":
-            raise ValueError(
-                f"solver 'relaxation' must come with control 'angle', got {self.control!r}"
-            )
-        if self.solver == "relaxation" and self.modes:
-            raise ValueError("modes must come with solver 'newton', got 'relaxation'")
-        if self.control != "arclength":
-            if self.until is not None:
-                raise ValueError(f"until must come with control 'arclength', got {self.control!r}")
-            if self.error_bars:
-                raise ValueError(
-                    f"error_bars must come with control 'arclength', got {self.control!r}"
-                )
+        for what, asked, setting, allowed in (
+            ("unload", self.unload, "control", ("angle", "moment")),
+            ("solver 'relaxation'", self.solver == "relaxation", "control", ("angle",)),
+            ("modes", self.modes, "solver", ("newton",)),
+            ("until", self.until is not None, "control", ("arclength",)),
+            ("error_bars", self.error_bars, "control", ("arclength",)),
+        ):
+            if asked and (value := getattr(self, setting)) not in allowed:
+                words = " or ".join(map(repr, allowed))
+                raise ValueError(f"{what} must come with {setting} {words}, got {value!r}")
 
     def _check_save_at(self, values: Sequence[float]) -> None:
         last = math.inf if self.until == "folded" else self.gamma_max
@@ -245,7 +239,7 @@ def meshes(n_edges: int, sector: str) -> tuple[int, int, int]:
     return n_edges, n_edges // 2, n_edges // 4
 
 
-def _whole(name: str, value: object) -> int:
+def _integer(name: str, value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise ValueError(f"{name} must be an integer, got {shown(value)}")
     return int(value)

@@ -11,20 +11,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path as File
 
-import typer
-
 from der.cli.clone import BenchOptions, StressOptions
 from der.cli.commands import leave
 from der.cli.files import check_named, check_writable, made_folder
 from der.cli.output import show
-from der.cli.parsing import add_command, options_named
+from der.cli.parsing import add_command, application, options_named
 
-app = typer.Typer(
-    help="The evidence: benchmark and stress test.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+app = application("The evidence: benchmark and stress test.")
 
 
 def benchmark(wanted: BenchOptions) -> int:

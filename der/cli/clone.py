@@ -10,11 +10,11 @@ import sys
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path as File
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from der.cli.parsing import integer_option
+from der.cli.parsing import file_option, folder_option, option
 
 _CLONE = ("der/__init__.py", "validation/__main__.py", "validation/benchmark/run.py")
 
@@ -23,34 +23,24 @@ _CLONE = ("der/__init__.py", "validation/__main__.py", "validation/benchmark/run
 class BenchOptions:
     """What is measured, and where it is written."""
 
-    json: Annotated[str | None, typer.Option(metavar="F", help="Write what is measured.")] = None
-    out: Annotated[
-        str | None,
-        typer.Option(metavar="DIR", help="Write bench.json, bench_error.png and bench_cost.png."),
-    ] = None
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer repetitions and sizes.")] = False
-    only: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PARTS",
-            help="Of paths, needs, orders, error, state, scaling, sweep, start; commas between.",
-        ),
-    ] = None
+    json: str | None = file_option("Write what is measured.")
+    out: str | None = folder_option("Write bench.json, bench_error.png and bench_cost.png.")
+    quick: bool = option("Fewer repetitions and sizes.", False)
+    only: str | None = option(
+        "Of paths, needs, orders, error, state, scaling, sweep, start; commas between.",
+        metavar="PARTS",
+    )
 
 
 @dataclass(frozen=True)
 class StressOptions:
     """Which cases are tried."""
 
-    quick: Annotated[bool, typer.Option("--quick", help="120 cases, under a minute.")] = False
-    long: Annotated[bool, typer.Option("--long", help="10,000 cases, ten minutes on 2 cores.")] = (
-        False
-    )
-    workers: Annotated[
-        int | None, integer_option("Processes; with --long one a core, else one.")
-    ] = None
-    seed: Annotated[int, integer_option("Of the cases.")] = 0
-    json: Annotated[str | None, typer.Option(metavar="F", help="Write the summary here.")] = None
+    quick: bool = option("120 cases, under a minute.", False)
+    long: bool = option("10,000 cases, ten minutes on 2 cores.", False)
+    workers: int | None = option("Processes; with --long one a core, else one.")
+    seed: int = option("Of the cases.", 0)
+    json: str | None = file_option("Write the summary here.")
 
 
 def bench(wanted: BenchOptions) -> int:

@@ -17,18 +17,13 @@ from der.cli.clone import bench, stress
 from der.cli.figures import figure, phase
 from der.cli.landscapes import landscape
 from der.cli.output import say
-from der.cli.parsing import add_command
+from der.cli.parsing import add_command, application
 from der.cli.paths import bvp, compare, fold
 from der.cli.states import planar, states
 
 COMMANDS = (fold, bvp, compare, figure, landscape, states, planar, phase, bench, stress)
 
-app = typer.Typer(
-    help="Discrete elastic rods for rings that fold by twisting.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+app = application("Discrete elastic rods for rings that fold by twisting.")
 
 
 def _show_version(wanted: bool) -> None:

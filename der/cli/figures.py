@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from pathlib import Path as File
-from typing import Annotated
 
 import typer
 
-from der.cli.files import check_named, folder_option
+from der.cli.files import check_named
 from der.cli.options import NU
 from der.cli.output import say, show
-from der.cli.parsing import integer_option, number_option, options_named
+from der.cli.parsing import argument, folder_option, option, options_named
 
 PHASES = {  # the diagrams of each shape, that of a cube last
     "ellipse": ("fig3a",),
@@ -25,12 +24,9 @@ PHASES = {  # the diagrams of each shape, that of a cube last
 class FigureOptions:
     """Which figures, and where they go."""
 
-    names: Annotated[
-        list[str],
-        typer.Argument(metavar="NAME...", help="fig2b, fig3b, ..., hysteresis; all; or diagrams."),
-    ]
-    out: Annotated[str, folder_option("The folder to write to.")]
-    workers: Annotated[int | None, integer_option("Processes; one a core if not given.")] = None
+    names: list[str] = argument("fig2b, fig3b, ..., hysteresis; all; or diagrams.", "NAME...")
+    out: str = folder_option("The folder to write to.", MISSING)
+    workers: int | None = option("Processes; one a core if not given.")
 
 
 def figure(wanted: FigureOptions) -> int:
@@ -59,35 +55,19 @@ def figure(wanted: FigureOptions) -> int:
 class PhaseOptions:
     """Which diagrams, of which cases, and where they go."""
 
-    shape: Annotated[
-        str,
-        typer.Argument(
-            metavar="SHAPE", help="ellipse, rectangle, triangle, circle; or a diagram: fig3a, ..."
-        ),
-    ]
-    out: Annotated[str, folder_option("The folder to write to.")]
-    workers: Annotated[int | None, integer_option("Processes; one a core if not given.")] = None
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, instead.")
-    ] = None
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the cases that the folder has.")
-    ] = False
-    nu: Annotated[float, number_option("Poisson's ratio.")] = NU
-    span: Annotated[
-        list[str] | None,
-        typer.Option("--range", metavar="NAME=A:B", help="Of a parameter, such as b_over_a=0.7:1."),
-    ] = None
-    finest: Annotated[int | None, integer_option("Finest cells along a side, a power of two.")] = (
-        None
+    shape: str = argument("ellipse, rectangle, triangle, circle; or a diagram: fig3a, ...", "SHAPE")
+    out: str = folder_option("The folder to write to.", MISSING)
+    workers: int | None = option("Processes; one a core if not given.")
+    scheduler: str | None = option("A Dask scheduler, instead.", metavar="ADDRESS")
+    resume: bool = option("Go on with the cases that the folder has.", False)
+    nu: float = option("Poisson's ratio.", NU)
+    span: list[str] | None = option(
+        "Of a parameter, such as b_over_a=0.7:1.", metavar="NAME=A:B", name="--range"
     )
-    check: Annotated[
-        str | None, typer.Option(help="'der': ask the rod about a sample of the cases.")
-    ] = None
-    sample: Annotated[int, integer_option("Cases that --check asks about.")] = 40
-    quiet: Annotated[
-        bool, typer.Option("--quiet", help="No progress and no summary; warnings.")
-    ] = False
+    finest: int | None = option("Finest cells along a side, a power of two.")
+    check: str | None = option("'der': ask the rod about a sample of the cases.")
+    sample: int = option("Cases that --check asks about.", 40)
+    quiet: bool = option("No progress and no summary; warnings.", False)
 
 
 def phase(wanted: PhaseOptions) -> int:

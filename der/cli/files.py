@@ -8,47 +8,27 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from der.cli.output import OUTPUT, Targets
+from der.cli.parsing import file_option, folder_option, option
 
 if TYPE_CHECKING:
     from der.records.path import Path
-
-
-def folder_option(text: str) -> Any:
-    """An option that takes a folder."""
-    return typer.Option(metavar="DIR", help=text)
-
-
-def file_option(text: str) -> Any:
-    """An option that takes a file."""
-    return typer.Option(metavar="F", help=text)
-
-
-Json: TypeAlias = Annotated[str | None, file_option("Write it here ('-': output).")]
-Plot: TypeAlias = Annotated[str | None, file_option("Draw it: .png, .pdf, .svg.")]
-Quiet: TypeAlias = Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")]
 
 
 @dataclass(frozen=True)
 class PathFiles:
     """What is written of a path."""
 
-    json: Annotated[str | None, file_option("Write the record here ('-': output).")] = None
-    plot: Annotated[str | None, file_option("Draw the path: .png, .pdf or .svg.")] = None
-    rrd: Annotated[str | None, file_option("Record for playback with rerun: .rrd.")] = None
-    movie: Annotated[str | None, file_option("Film it: .gif, or .mp4 (needs ffmpeg).")] = None
-    html: Annotated[str | None, file_option("A page to scrub in any browser: .html.")] = None
-    beside: Annotated[
-        str | None, folder_option("Show the ring of this --out DIR, too, where it moves.")
-    ] = None
-    out: Annotated[str | None, folder_option("Write path.json, path.png and shapes.npz here.")] = (
-        None
-    )
-    quiet: Quiet = False
+    json: str | None = file_option("Write the record here ('-': output).")
+    plot: str | None = file_option("Draw the path: .png, .pdf or .svg.")
+    rrd: str | None = file_option("Record for playback with rerun: .rrd.")
+    movie: str | None = file_option("Film it: .gif, or .mp4 (needs ffmpeg).")
+    html: str | None = file_option("A page to scrub in any browser: .html.")
+    beside: str | None = folder_option("Show the ring of this --out DIR, too, where it moves.")
+    out: str | None = folder_option("Write path.json, path.png and shapes.npz here.")
+    quiet: bool = option("No progress and no summary.", False)
 
     @property
     def moving(self) -> bool:
@@ -75,43 +55,41 @@ class PathFiles:
 class ComparisonFiles:
     """What a comparison writes."""
 
-    json: Annotated[str | None, file_option("Write both records and differences here.")] = None
-    plot: Annotated[str | None, file_option("Draw both: .png, .pdf or .svg.")] = None
-    out: Annotated[str | None, folder_option("Write comparison.json and .png here.")] = None
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no table.")] = False
+    json: str | None = file_option("Write both records and differences here.")
+    plot: str | None = file_option("Draw both: .png, .pdf or .svg.")
+    out: str | None = folder_option("Write comparison.json and .png here.")
+    quiet: bool = option("No progress and no table.", False)
 
 
 @dataclass(frozen=True)
 class LandscapeFiles:
     """What is written of a landscape."""
 
-    json: Json = None
-    plot: Plot = None
-    rrd: Annotated[
-        str | None, file_option("Record it with the ring for playback with rerun: .rrd.")
-    ] = None
-    out: Annotated[str | None, folder_option("Write landscape.json and .png here.")] = None
-    quiet: Quiet = False
+    json: str | None = file_option("Write it here ('-': output).")
+    plot: str | None = file_option("Draw it: .png, .pdf, .svg.")
+    rrd: str | None = file_option("Record it with the ring for playback with rerun: .rrd.")
+    out: str | None = folder_option("Write landscape.json and .png here.")
+    quiet: bool = option("No progress and no summary.", False)
 
 
 @dataclass(frozen=True)
 class StatesFiles:
     """What is written of states."""
 
-    json: Json = None
-    plot: Plot = None
-    out: Annotated[str | None, folder_option("Write states.json, .png and shapes.npz here.")] = None
-    quiet: Quiet = False
+    json: str | None = file_option("Write it here ('-': output).")
+    plot: str | None = file_option("Draw it: .png, .pdf, .svg.")
+    out: str | None = folder_option("Write states.json, .png and shapes.npz here.")
+    quiet: bool = option("No progress and no summary.", False)
 
 
 @dataclass(frozen=True)
 class PlanarFiles:
     """What is written of planar states."""
 
-    json: Json = None
-    plot: Plot = None
-    out: Annotated[str | None, folder_option("Write planar.json, .png and shapes.npz here.")] = None
-    quiet: Annotated[bool, typer.Option("--quiet", help="No summary.")] = False
+    json: str | None = file_option("Write it here ('-': output).")
+    plot: str | None = file_option("Draw it: .png, .pdf, .svg.")
+    out: str | None = folder_option("Write planar.json, .png and shapes.npz here.")
+    quiet: bool = option("No summary.", False)
 
 
 # --- Before the work -------------------------------------------------------------------------

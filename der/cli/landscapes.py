@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 import der
 from der.cli.files import LandscapeFiles, targets
 from der.cli.options import PathOptions, RingOptions
-from der.cli.parsing import integer_option, options_named
+from der.cli.parsing import option, options_named
 from der.cli.run import Tick, over_gamma, run
 
 CELLS = 60  # along each side of a surface
@@ -22,16 +20,10 @@ CELLS = 60  # along each side of a surface
 class LandscapeOptions:
     """Which landscape."""
 
-    two_dimensional: Annotated[
-        bool, typer.Option("--two-dimensional", help="Over twist and grip distance.")
-    ] = False
-    free: Annotated[bool, typer.Option("--free", help="The barrier with the grips removed.")] = (
-        False
-    )
-    push: Annotated[
-        bool, typer.Option("--push", help="The forces or couples that open it with least work.")
-    ] = False
-    cells: Annotated[int, integer_option("Along each side, with --two-dimensional.")] = CELLS
+    two_dimensional: bool = option("Over twist and grip distance.", False)
+    free: bool = option("The barrier with the grips removed.", False)
+    push: bool = option("The forces or couples that open it with least work.", False)
+    cells: int = option("Along each side, with --two-dimensional.", CELLS)
 
     def solver(self, scene: der.Scene) -> Callable[[Tick], Any]:
         """What finds the landscape of a scene."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from der.cli.parsing import integer_option, number_option, numbers
+from der.cli.parsing import argument, numbers, option
 
 if TYPE_CHECKING:
     from der.geometry.ring import Ring
@@ -29,37 +29,20 @@ NU = 0.3  # Poisson's ratio where none is given
 class RingOptions:
     """A ring and its section."""
 
-    shape: Annotated[
-        str, typer.Argument(metavar="SHAPE", help="The ring: " + ", ".join(SHAPES) + ".")
-    ]
-    file: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[FILE]", help="Of a profile: CSV of arc_length, curvature or x, y."
-        ),
-    ] = None
-    b_over_a: Annotated[
-        float | None, number_option("Short semi-axis over the long one, ellipse and rectangle.")
-    ] = None
-    r_over_a: Annotated[
-        float | None, number_option("Radius of the fillets, rectangle and triangle.")
-    ] = None
-    vertex_angle: Annotated[
-        float | None, number_option("Angle at the apex of a triangle, degrees.")
-    ] = None
-    natural_curvature: Annotated[
-        float | None, number_option("Natural curvature of a circle, in units of 1/a.")
-    ] = None
-    axis: Annotated[
-        str, typer.Option(help="Twisting axis: x (grips at the short semi-axis) or y.")
-    ] = "x"
-    h_over_t: Annotated[float | None, number_option("Height over thickness of the section.")] = None
-    alpha: Annotated[float | None, number_option("EI1/GJ, with --beta.")] = None
-    beta: Annotated[float | None, number_option("EI2/GJ, with --alpha.")] = None
-    nu: Annotated[float, number_option("Poisson's ratio, with --h-over-t.")] = NU
-    a_over_t: Annotated[
-        float, number_option("Reference length over thickness: finite stretch and drawing.")
-    ] = 200.0
+    shape: str = argument("The ring: " + ", ".join(SHAPES) + ".", "SHAPE")
+    file: str | None = argument(
+        "Of a profile: CSV of arc_length, curvature or x, y.", "[FILE]", None
+    )
+    b_over_a: float | None = option("Short semi-axis over the long one, ellipse and rectangle.")
+    r_over_a: float | None = option("Radius of the fillets, rectangle and triangle.")
+    vertex_angle: float | None = option("Angle at the apex of a triangle, degrees.")
+    natural_curvature: float | None = option("Natural curvature of a circle, in units of 1/a.")
+    axis: str = option("Twisting axis: x (grips at the short semi-axis) or y.", "x")
+    h_over_t: float | None = option("Height over thickness of the section.")
+    alpha: float | None = option("EI1/GJ, with --beta.")
+    beta: float | None = option("EI2/GJ, with --alpha.")
+    nu: float = option("Poisson's ratio, with --h-over-t.", NU)
+    a_over_t: float = option("Reference length over thickness: finite stretch and drawing.", 200.0)
 
     def ring(self) -> Ring:
         """The ring that the command line describes."""
@@ -97,101 +80,57 @@ class RingOptions:
 
     def section(self) -> Section:
         """The section that the command line describes."""
-        return _section(self.h_over_t, self.alpha, self.beta, self.nu)
+        from der.geometry.section import rectangular_section, section
+
+        h_over_t, alpha, beta, nu = self.h_over_t, self.alpha, self.beta, self.nu
+        if h_over_t is None and nu != NU:
+            raise ValueError(f"nu can only be given together with --h-over-t, got {nu}")
+        if h_over_t is not None:
+            if alpha is not None or beta is not None:
+                raise ValueError(
+                    f"h_over_t cannot be given together with --alpha and --beta, got {h_over_t}"
+                )
+            try:
+                return rectangular_section(h_over_t, nu)
+            except ValueError as wrong:
+                if str(wrong).startswith(("alpha", "beta")):  # not what the user gave
+                    raise ValueError(f"h_over_t is too extreme: {wrong} for {h_over_t}") from None
+                raise
+        if alpha is None and beta is None:
+            raise ValueError("h_over_t (or both --alpha and --beta) must be given, got neither")
+        if alpha is None:
+            raise ValueError(f"alpha must be given together with --beta {beta}, got none")
+        if beta is None:
+            raise ValueError(f"beta must be given together with --alpha {alpha}, got none")
+        return section(alpha, beta)
 
 
 @dataclass(frozen=True)
 class PathOptions:
     """What is wanted of a path, and how it is found."""
 
-    edges: Annotated[int, integer_option("Edges of the full ring.")] = 64
-    gamma_max: Annotated[float, number_option("Where the path ends, rad.")] = math.pi
-    until: Annotated[
-        str | None, typer.Option(help="'folded': until the three-covered state, beyond pi too.")
-    ] = None
-    save_at: Annotated[
-        str | None, typer.Option(help="Solve at these gammas (rad, commas), not at k pi/8.")
-    ] = None
-    curvature: Annotated[
-        str, typer.Option(help="Measure of curvature: logarithm, angle or tangent.")
-    ] = "logarithm"
-    stretch: Annotated[str, typer.Option(help="inextensible or finite (EA).")] = "inextensible"
-    tolerance: Annotated[
-        float | None,
-        number_option("fold: residual of an equilibrium, GJ/a, 1e-10; bvp: relative error, 1e-8."),
-    ] = None
-    stability: Annotated[
-        bool, typer.Option("--stability/--no-stability", help="Index of the full ring.")
-    ] = True
-    control: Annotated[
-        str, typer.Option(help="arclength (through folds), angle or moment (with snaps).")
-    ] = "arclength"
-    unload: Annotated[
-        bool, typer.Option("--unload", help="Come back to 0, with --control angle or moment.")
-    ] = False
-    solver: Annotated[str, typer.Option(help="newton, or relaxation with --control angle.")] = (
-        "newton"
+    edges: int = option("Edges of the full ring.", 64)
+    gamma_max: float = option("Where the path ends, rad.", math.pi)
+    until: str | None = option("'folded': until the three-covered state, beyond pi too.")
+    save_at: str | None = option("Solve at these gammas (rad, commas), not at k pi/8.")
+    curvature: str = option("Measure of curvature: logarithm, angle or tangent.", "logarithm")
+    stretch: str = option("inextensible or finite (EA).", "inextensible")
+    tolerance: float | None = option(
+        "fold: residual of an equilibrium, GJ/a, 1e-10; bvp: relative error, 1e-8."
     )
-    error_bars: Annotated[
-        bool, typer.Option("--error-bars", help="Extrapolate from N, N/2, N/4 edges, with errors.")
-    ] = False
-    sector: Annotated[str, typer.Option(help="auto, full, half or quarter.")] = "auto"
+    stability: bool = option("Index of the full ring.", True)
+    control: str = option("arclength (through folds), angle or moment (with snaps).", "arclength")
+    unload: bool = option("Come back to 0, with --control angle or moment.", False)
+    solver: str = option("newton, or relaxation with --control angle.", "newton")
+    error_bars: bool = option("Extrapolate from N, N/2, N/4 edges, with errors.", False)
+    sector: str = option("auto, full, half or quarter.", "auto")
 
     def scene(self, ring: RingOptions, **more: Any) -> Scene:
         """The scene that the command line describes."""
         from der.scene import Scene
 
-        wanted: dict[str, Any] = {
-            "n_edges": self.edges,
-            "sector": self.sector,
-            "stability": self.stability,
-            "error_bars": self.error_bars,
-            "control": self.control,
-            "unload": self.unload,
-            "solver": self.solver,
-            "gamma_max": self.gamma_max,
-            "until": self.until,
-            "save_at": numbers("save_at", self.save_at),
-            "curvature": self.curvature,
-            "stretch": self.stretch,
-            "a_over_t": ring.a_over_t,
-        }
-        if self.tolerance is not None:
-            wanted["tolerance"] = self.tolerance
+        wanted: dict[str, Any] = {n: v for n, v in vars(self).items() if v is not None}
+        wanted["n_edges"] = wanted.pop("edges")
+        wanted["save_at"] = numbers("save_at", self.save_at)
+        wanted["a_over_t"] = ring.a_over_t
         return Scene(ring.ring(), ring.section(), **wanted | more)
-
-
-@dataclass(frozen=True)
-class LiveOptions:
-    """Watching."""
-
-    live: Annotated[
-        bool, typer.Option("--live", help="Serve what --rrd records for watching, until Ctrl-C.")
-    ] = False
-    port: Annotated[int, integer_option("Where --live serves.")] = 9876
-
-
-def _section(h_over_t: float | None, alpha: float | None, beta: float | None, nu: float) -> Section:
-    """The section that the command line describes."""
-    from der.geometry.section import rectangular_section, section
-
-    if h_over_t is None and nu != NU:
-        raise ValueError(f"nu can only be given together with --h-over-t, got {nu}")
-    if h_over_t is not None:
-        if alpha is not None or beta is not None:
-            raise ValueError(
-                f"h_over_t cannot be given together with --alpha and --beta, got {h_over_t}"
-            )
-        try:
-            return rectangular_section(h_over_t, nu)
-        except ValueError as wrong:
-            if str(wrong).startswith(("alpha", "beta")):  # not what the user gave
-                raise ValueError(f"h_over_t is too extreme: {wrong} for {h_over_t}") from None
-            raise
-    if alpha is None and beta is None:
-        raise ValueError("h_over_t (or both --alpha and --beta) must be given, got neither")
-    if alpha is None:
-        raise ValueError(f"alpha must be given together with --beta {beta}, got none")
-    if beta is None:
-        raise ValueError(f"beta must be given together with --alpha {alpha}, got none")
-    return section(alpha, beta)

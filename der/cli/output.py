@@ -6,11 +6,11 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from der.records.path import Path
-    from der.utils.files import FilePath
+    from der.utils.files import Saved
 
 UNSAVED = File("der-unfinished.json")  # where what is unfinished goes if no file was named
 OUTPUT = File("-")  # standard output
@@ -18,16 +18,6 @@ DRAWN = ("plot", "rrd", "html", "movie")  # the quick ones first
 
 Targets: TypeAlias = dict[str, list[File]]  # by option, that of --out first
 Writers: TypeAlias = Mapping[str, Callable[[File], object] | str]  # or why there is nothing to draw
-
-
-class Record(Protocol):
-    """What every answer can do."""
-
-    def save(self, path: FilePath) -> None:
-        """Write JSON."""
-
-    def to_json(self) -> str:
-        """JSON text."""
 
 
 def say(line: str) -> None:
@@ -75,7 +65,7 @@ def whereabouts(path: Path, targets: Targets) -> str:
     )
 
 
-def deliver(record: Record, targets: Targets, writers: Writers) -> int:
+def deliver(record: Saved, targets: Targets, writers: Writers) -> int:
     """Write the record first, then what is drawn of it; say what could not be; the exit code.
 
     A record that can be written nowhere goes to standard output, also in ``targets``, and one that
@@ -93,19 +83,13 @@ def deliver(record: Record, targets: Targets, writers: Writers) -> int:
         try:
             if isinstance(writer, str):
                 say(f"der: {file} was not drawn: {writer}")
-            else:
-                writer(file)
+            elif _written(writer, file):
                 drawn.append(file)
+            else:
+                done = False
+            del missing[0]
         except KeyboardInterrupt:
             pressed.append(1)
-        except (OSError, ValueError) as wrong:
-            if _stopped(wrong):
-                pressed.append(1)
-            else:
-                say(f"der: could not write {file}: {wrong}")
-                done = False
-        if not pressed:
-            del missing[0]
     if not missing:
         return 0 if done else 3
     with interrupts_between_states():
@@ -118,31 +102,32 @@ def deliver(record: Record, targets: Targets, writers: Writers) -> int:
     return 130
 
 
-def _keep(record: Record, targets: Targets, writers: Writers) -> bool:
+def _keep(record: Saved, targets: Targets, writers: Writers) -> bool:
     """Write the record and its shapes."""
-    done = True
-    good: list[File] = []
-    for file in targets.get("json", ()):
-        try:
-            if file != OUTPUT:
-                record.save(file)
-            good.append(file)
-        except (OSError, ValueError) as wrong:
-            done = False
-            say(f"der: could not write {file}: {wrong}")
-    if "json" in targets:
+    files = targets.get("json", [])
+    good = [file for file in files if file == OUTPUT or _written(record.save, file)]
+    done = len(good) == len(files)
+    if files:
         targets["json"] = good or [OUTPUT]
         if OUTPUT in targets["json"]:
             done = show(record.to_json().rstrip()) and done
     writer = writers.get("shapes")
-    for file in targets.get("shapes", ()):
-        try:
-            if callable(writer):
-                writer(file)
-        except (OSError, ValueError) as wrong:
-            done = False
-            say(f"der: could not write {file}: {wrong}")
+    if callable(writer):
+        for file in targets.get("shapes", ()):
+            done = _written(writer, file) and done
     return done
+
+
+def _written(write: Callable[[File], object], file: File) -> bool:
+    """Whether a file could be written; if not, a line on standard error says why."""
+    try:
+        write(file)
+    except (OSError, ValueError) as wrong:
+        if _stopped(wrong):
+            raise KeyboardInterrupt from wrong
+        say(f"der: could not write {file}: {wrong}")
+        return False
+    return True
 
 
 def _stopped(wrong: BaseException | None) -> bool:

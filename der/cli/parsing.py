@@ -1,11 +1,18 @@
-"""From groups of options to a command: parsing of numbers, and errors that name the option."""
+"""From groups of options to a command: parsing of numbers, and errors that name the option.
+
+A group is a dataclass, and an option is a field of it:
+
+    edges: int = option("Edges of the full ring.", 64)
+
+The type of the field says how the text is read; a bool is a flag.
+"""
 
 from __future__ import annotations
 
 import inspect
 from contextlib import contextmanager
-from dataclasses import MISSING, fields
-from typing import TYPE_CHECKING, Any, get_type_hints
+from dataclasses import MISSING, field, fields
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
@@ -13,8 +20,31 @@ from der.cli.output import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from dataclasses import Field
 
 _OPTIONS = {"n_edges": "--edges", "twist_axis": "--axis", "file": "FILE"}  # named otherwise
+
+
+def option(
+    text: str, default: Any = None, *, name: str | None = None, metavar: str | None = None
+) -> Any:
+    """Declare a field that is an option; ``text`` is its help, ``name`` one of its own."""
+    return field(default=default, metadata={"help": text, "name": name, "metavar": metavar})
+
+
+def file_option(text: str) -> Any:
+    """Declare a field that is the name of a file."""
+    return option(text, metavar="F")
+
+
+def folder_option(text: str, default: Any = None) -> Any:
+    """Declare a field that is the name of a folder."""
+    return option(text, default, metavar="DIR")
+
+
+def argument(text: str, metavar: str, default: Any = MISSING) -> Any:
+    """Declare a field that is an argument without a name."""
+    return field(default=default, metadata={"argument": typer.Argument(metavar=metavar, help=text)})
 
 
 def number(text: str) -> float:
@@ -33,6 +63,9 @@ def integer(text: str) -> int:
         raise typer.BadParameter(f"must be an integer, got {text!r}") from None
 
 
+_PARSERS: dict[Any, Any] = {float: number, int: integer}
+
+
 def numbers(name: str, text: str | None) -> tuple[float, ...] | None:
     """The numbers in a comma-separated list."""
     if text is None:
@@ -43,16 +76,6 @@ def numbers(name: str, text: str | None) -> tuple[float, ...] | None:
         raise ValueError(f"{name} must be numbers separated by commas, got {text!r}") from None
 
 
-def number_option(text: str, *names: str) -> Any:
-    """An option that takes a number."""
-    return typer.Option(*names, parser=number, help=text)
-
-
-def integer_option(text: str, *names: str) -> Any:
-    """An option that takes an integer."""
-    return typer.Option(*names, parser=integer, help=text)
-
-
 @contextmanager
 def options_named() -> Iterator[None]:
     """Turn a ValueError about an argument into one about the option of that name."""
@@ -60,8 +83,15 @@ def options_named() -> Iterator[None]:
         yield
     except ValueError as wrong:
         name, *words = str(wrong).split(" ", 1)
-        option = _OPTIONS.get(name, f"--{name.replace('_', '-')}")
-        raise typer.TyperException(" ".join([option, *words])) from None
+        named = _OPTIONS.get(name, f"--{name.replace('_', '-')}")
+        raise typer.TyperException(" ".join([named, *words])) from None
+
+
+def application(text: str) -> typer.Typer:
+    """A program without commands; ``text`` is its help."""
+    return typer.Typer(
+        help=text, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+    )
 
 
 def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
@@ -84,20 +114,29 @@ def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
             code = 130
         raise typer.Exit(code)
 
-    hints: dict[str, Any] = {}
-    for group in groups.values():
-        hints |= get_type_hints(group, include_extras=True)
     parameters = [
-        inspect.Parameter(
-            f.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if f.default is MISSING else f.default,
-            annotation=hints[f.name],
-        )
+        _parameter(one, get_type_hints(group)[one.name])
         for group in groups.values()
-        for f in fields(group)
+        for one in fields(group)
     ]
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = hints
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
     run.__doc__ = function.__doc__
     app.command(name=function.__name__)(run)
+
+
+def _parameter(one: Field[Any], hint: Any) -> inspect.Parameter:
+    """A field of a group as typer reads it."""
+    found = one.metadata.get("argument")
+    if found is None:
+        names = [one.metadata["name"]] if one.metadata["name"] else []
+        if hint is bool and not names:
+            flag = f"--{one.name.replace('_', '-')}"
+            names = [f"{flag}/--no-{flag[2:]}" if one.default else flag]
+        parsers = [_PARSERS[kind] for kind in get_args(hint) or (hint,) if kind in _PARSERS]
+        parser = parsers[0] if parsers else None
+        text, metavar = one.metadata["help"], one.metadata["metavar"]
+        found = typer.Option(*names, parser=parser, metavar=metavar, help=text)
+    default = inspect.Parameter.empty if one.default is MISSING else one.default
+    kind = inspect.Parameter.KEYWORD_ONLY
+    return inspect.Parameter(one.name, kind, default=default, annotation=Annotated[hint, found])

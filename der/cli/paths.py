@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Annotated
-
-import typer
 
 import der
 from der.cli.files import ComparisonFiles, PathFiles, targets
 from der.cli.options import PathOptions, RingOptions
-from der.cli.parsing import integer_option, options_named
+from der.cli.parsing import option, options_named
 from der.cli.run import Tick, keep_showing, over_gamma, run, served
 
 
@@ -19,10 +16,8 @@ from der.cli.run import Tick, keep_showing, over_gamma, run, served
 class LiveOptions:
     """Watching."""
 
-    live: Annotated[
-        bool, typer.Option("--live", help="Serve what --rrd records for watching, until Ctrl-C.")
-    ] = False
-    port: Annotated[int, integer_option("Where --live serves.")] = 9876
+    live: bool = option("Serve what --rrd records for watching, until Ctrl-C.", False)
+    port: int = option("Where --live serves.", 9876)
 
 
 def fold(ring: RingOptions, path: PathOptions, files: PathFiles, watch: LiveOptions) -> int:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import der
 from der.cli.files import PlanarFiles, StatesFiles, targets
 from der.cli.options import RingOptions
-from der.cli.parsing import integer_option, number_option, options_named
+from der.cli.parsing import option, options_named
 from der.cli.run import Tick, counted, run
 
 
@@ -16,13 +16,9 @@ from der.cli.run import Tick, counted, run
 class StatesOptions:
     """Which states."""
 
-    gamma: Annotated[
-        float | None, number_option("Rotation of each grip, rad; the ring is free if not given.")
-    ] = None
-    count: Annotated[
-        int, integer_option("States after which to stop; minima that these relax to are added.")
-    ] = 12
-    edges: Annotated[int, integer_option("Edges of the full ring.")] = 64
+    gamma: float | None = option("Rotation of each grip, rad; the ring is free if not given.")
+    count: int = option("States after which to stop; minima that these relax to are added.", 12)
+    edges: int = option("Edges of the full ring.", 64)
 
     def scene(self, options: RingOptions) -> der.Scene:
         """The scene that the command line describes."""
@@ -52,12 +48,11 @@ def states(ring: RingOptions, wanted: StatesOptions, files: StatesFiles) -> int:
 class PlanarOptions:
     """What is sought in the plane."""
 
-    distance: Annotated[
-        float | None,
-        number_option("Squeeze or pull the flat ring until the points of its axis are so far, a."),
-    ] = None
-    turns: Annotated[int | None, integer_option("Cover circles up to so many times.")] = None
-    edges: Annotated[int, integer_option("Edges of the full ring.")] = 256
+    distance: float | None = option(
+        "Squeeze or pull the flat ring until the points of its axis are so far, a."
+    )
+    turns: int | None = option("Cover circles up to so many times.")
+    edges: int = option("Edges of the full ring.", 256)
 
 
 def planar(ring: RingOptions, wanted: PlanarOptions, files: PlanarFiles) -> int:

@@ -7,14 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from der.records.entries import Checked, Count, Number, Text
+from der.records.entries import Checked
 from der.records.path import Path
 from der.records.record import Record
+from der.records.values import Count, Number, Text
 
 
 @dataclass(frozen=True)
 class ComparedState(Checked):
     """A state of the rod and its counterpart."""
+
+    DERIVED: ClassVar[tuple[str, ...]] = ("agrees",)
 
     gamma: Number  # rad
     kind: Text  # "" or the kind of special point
@@ -34,20 +37,12 @@ class ComparedState(Checked):
             return None
         return self.moment_distance <= self.moment_bar and self.energy_distance <= self.energy_bar
 
-    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
-        """The entries and whether both agree."""
-        return entries | {"agrees": self.agrees}
-
-    @classmethod
-    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
-        """The entries without what follows from them."""
-        entries.pop("agrees", None)
-        return entries
-
 
 @dataclass(frozen=True)
 class ComparedPoint(Checked):
     """A fold or limit of both paths."""
+
+    DERIVED: ClassVar[tuple[str, ...]] = ("difference",)
 
     kind: Text
     rod_gamma: Number  # rad
@@ -60,23 +55,16 @@ class ComparedPoint(Checked):
         return abs(self.rod_gamma - self.bvp_gamma)
 
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
-        """The entries and the difference."""
+        """The entries, the bar after the difference."""
         bar = entries.pop("bar")
-        return entries | {"difference": self.difference, "bar": bar}
-
-    @classmethod
-    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
-        """The entries without what follows from them."""
-        entries.pop("difference", None)
-        return entries
+        return super().on_disk(entries) | {"bar": bar}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Record):
+class Comparison(Record, name="comparison", plot="comparison"):
     """A rod's path and that of its boundary-value problem."""
 
-    NAME: ClassVar[str] = "comparison"
-    PLOT: ClassVar[str] = "der.viz.plots.comparison"
+    DERIVED: ClassVar[tuple[str, ...]] = ("within",)
 
     rod: Path
     bvp: Path
@@ -86,14 +74,8 @@ class Comparison(Record):
 
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
         """The entries and the share that agrees; null where it is not known."""
-        share = None if math.isnan(self.within) else self.within
-        return super().on_disk(entries | {"within": share})
-
-    @classmethod
-    def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
-        """The entries without what follows from them."""
-        entries.pop("within", None)
-        return super().from_disk(entries)
+        written = super().on_disk(entries)
+        return written | ({"within": None} if math.isnan(self.within) else {})
 
     def facts(self) -> list[str]:
         """How well both agree."""

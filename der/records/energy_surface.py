@@ -6,22 +6,14 @@ Energies are those of the full ring in GJ/a, moments of one arm, angles in radia
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from der.records.entries import (
-    Checked,
-    Column,
-    Entry,
-    Json,
-    Number,
-    Text,
-    gaps,
-    table,
-)
-from der.records.record import Record, SolveTime, Status
+from der.records.entries import Checked, Entry
+from der.records.record import RingRecord, SolveTime
+from der.records.values import Column, Number, Text, gaps, table
 from der.utils import checks
 from der.utils.checks import Array, optional
 
@@ -66,22 +58,13 @@ class NoMinimum(Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Surface(Record):
+class Surface(RingRecord, name="energy surface", kind="surface", plot="energy_surface"):
     """Least energy at prescribed twist and distance of the grips; NaN where no minimum was found.
 
     Minima are those among the shapes that have the symmetry of the ring in its grips; ``index`` is
     that of the full ring, and where it is not 0 an unstable mode breaks the symmetry.
     """
 
-    NAME: ClassVar[str] = "energy surface"
-    KIND: ClassVar[str] = "surface"
-    PLOT: ClassVar[str] = "der.viz.plots.energy_surface"
-
-    status: Status
-    message: Text
-    ring: Json
-    section: Json
-    numerics: Json
     gamma: Column  # (n,) rad
     distance: Column  # (m,) a, between the grips
     energy: Annotated[Array, _MAP]  # (n, m) of the lowest minimum

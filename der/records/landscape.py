@@ -1,7 +1,7 @@
 """What is known of a ring's energy landscape; free of kernels.
 
-Answers of growing freedom: along the path of twisting (`Landscape`), over twist and grip distance
-(`der.records.energy_surface`), and of the free ring (`Pass`); `BarrierCurves` are those over h/t.
+`Landscape` is that along the path of twisting, `Pass` that of the free ring. The one over twist and
+grip distance is in `der.records.energy_surface`, barriers over h/t are in `der.records.barriers`.
 Energies are those of the full ring in GJ/a, moments of one arm, angles in radians.
 """
 
@@ -13,23 +13,10 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from der.records.entries import (
-    Checked,
-    Column,
-    Count,
-    Estimates,
-    Json,
-    Number,
-    Text,
-    Texts,
-    Truth,
-    gaps,
-    in_memory,
-    mapping,
-    table,
-)
+from der.records.entries import Checked, in_memory
 from der.records.path import Path, Timing
 from der.records.record import Record, SolveTime, Status
+from der.records.values import Count, Estimates, Json, Number, Text, Texts, Truth, table
 from der.utils.checks import Array
 
 # --- Along the path of twisting --------------------------------------------------------------
@@ -80,12 +67,9 @@ class Barriers(Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Landscape(Record):
+class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
     """Energy along the path of twisting, from the flat ring to the folded one."""
 
-    NAME: ClassVar[str] = "landscape"
-    KIND: ClassVar[str] = "landscape"
-    PLOT: ClassVar[str] = "der.viz.plots.landscape"
     JOINED: ClassVar[str] = "path"
     _KNOWN: ClassVar[dict[str, Any]] = {"solver": "der", "at_pi": None, "mode": None, "error": None}
 
@@ -160,41 +144,6 @@ class Landscape(Record):
 _ABOUT = ("status", "message", "reason", "ring", "section", "numerics")
 _OF_PATH = (*_ABOUT, "gamma", "energy", "moment", "index", "index_moment", "points")
 _OWN = ("rests", "folded", "barriers", "why", "extrapolated")
-_ALONG = gaps("h_over_t")
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class BarrierCurves(Record):
-    """Barriers over the section's h/t; NaN where there is none, or none is known."""
-
-    NAME: ClassVar[str] = "barriers over h/t"
-    KIND: ClassVar[str] = "barriers"
-    PLOT: ClassVar[str] = "der.viz.plots.barriers"
-
-    ring: Json
-    numerics: Json
-    h_over_t: Column  # (n,)
-    fold: Annotated[Array, _ALONG]  # (n,) from flat, with clamped grips that turn freely
-    open: Annotated[Array, _ALONG]  # (n,) from folded
-    gamma: Annotated[Array, _ALONG]  # (n,) of the saddle, rad
-    folded_energy: Annotated[Array, _ALONG]
-    fold_free: Annotated[Array, _ALONG]  # as fold and open, with the grips removed; NaN: not asked
-    open_free: Annotated[Array, _ALONG]
-    index_free: tuple[Count | None, ...]  # (n,) of the saddle of twisting with the grips removed
-    why: tuple[Text, ...]  # (n,) sentences where something is missing
-    error: Annotated[Mapping[str, Array], mapping(gaps(None))]  # with error bars: (n,) by name; the
-    # arrays are then extrapolated
-    timing: SolveTime
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name, values in {"index_free": self.index_free, "why": self.why, **self.error}.items():
-            self._check_lengths(name, values, ("h_over_t",))
-
-    def facts(self) -> list[str]:
-        """Over which h/t."""
-        ends = f"{self.h_over_t[0]:g} to {self.h_over_t[-1]:g}" if len(self.h_over_t) else "-"
-        return [f"h/t {ends}"]
 
 
 # --- Without grips ---------------------------------------------------------------------------
@@ -222,12 +171,8 @@ class Heights(Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Pass(Record):
+class Pass(Record, name="barrier of the free ring", kind="pass", plot="minimum_energy_path"):
     """The lowest saddle found between flat and folded of the free ring, and the path over it."""
-
-    NAME: ClassVar[str] = "barrier of the free ring"
-    KIND: ClassVar[str] = "pass"
-    PLOT: ClassVar[str] = "der.viz.plots.minimum_energy_path"
 
     ring: Json
     section: Json

@@ -8,23 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
-from der.records.entries import (
-    Checked,
-    Count,
-    Entry,
-    Estimates,
-    Json,
-    Number,
-    Text,
-    Truth,
-    in_memory,
-    numbers,
-    one_of,
-    table,
-)
+from der.records.entries import Checked, Entry, in_memory
 from der.records.record import Record, SolveTime, Status
+from der.records.values import Count, Estimates, Json, Number, Text, Truth, numbers, one_of, table
 from der.utils import checks
 from der.utils.checks import Array
 
@@ -84,12 +72,8 @@ class Push(Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class LeastPush(Record):
+class LeastPush(Record, name="least push", kind="push", plot="opening"):
     """The ways of pushing a folded ring open that were tried, and the one of least work."""
-
-    NAME: ClassVar[str] = "least push"
-    KIND: ClassVar[str] = "push"
-    PLOT: ClassVar[str] = "der.viz.plots.opening"
 
     status: Status
     why: Text  # a sentence where there is none

@@ -17,20 +17,9 @@ import numpy as np
 
 from der.errors import Reason
 from der.records.configurations import Shapes
-from der.records.entries import (
-    Checked,
-    Column,
-    Count,
-    Json,
-    Number,
-    Text,
-    Truth,
-    along,
-    in_memory,
-    indices,
-    one_of,
-)
+from der.records.entries import Checked, in_memory
 from der.records.record import Record, SolveTime, Status
+from der.records.values import Column, Count, Json, Number, Text, Truth, along, indices, one_of
 from der.utils import checks
 from der.utils.checks import Array, Counts, optional
 
@@ -111,7 +100,7 @@ class Timing(SolveTime):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Path(Record):
+class Path(Record, name="path", plot="path"):
     """A path of equilibria, the answer of either solver; compare two by their `to_json`.
 
     `load` reads what `save` or ``der fold --out`` has written. Mappings are of JSON's types: str
@@ -123,8 +112,6 @@ class Path(Record):
         If lengths, kinds or types are others, or a number is not finite; the message names it.
     """
 
-    NAME: ClassVar[str] = "path"
-    PLOT: ClassVar[str] = "der.viz.plots.path"
     OPTIONAL: ClassVar[tuple[str, ...]] = ("status", "message", "reason", "raw")
 
     solver: Annotated[str, one_of(SOLVERS)]

@@ -6,23 +6,12 @@ Energies are those of the full ring in GJ/a, lengths in a, forces in GJ/a^2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from der.records.configurations import Shapes
-from der.records.entries import (
-    Checked,
-    Column,
-    Count,
-    Integer,
-    Json,
-    Number,
-    Text,
-    along,
-    gaps,
-    in_memory,
-    one_of,
-)
-from der.records.record import Record, SolveTime, Status
+from der.records.entries import Checked, in_memory
+from der.records.record import RingRecord, SolveTime
+from der.records.values import Column, Count, Integer, Number, Text, along, gaps, one_of
 from der.utils.checks import Array
 
 KINDS = ("", "fold", "limit", "branch")
@@ -51,22 +40,13 @@ class PlanarState(Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class PlanarStates(Record):
+class PlanarStates(RingRecord, name="planar states of a ring", kind="planar", plot="planar"):
     """The planar states of a ring that were found, lowest first.
 
     `load` reads what `save` or ``der planar --out`` has written. The shapes are in a file of their
     own, ``der.Shapes.load("shapes.npz")``, in the order of the states.
     """
 
-    NAME: ClassVar[str] = "planar states of a ring"
-    KIND: ClassVar[str] = "planar"
-    PLOT: ClassVar[str] = "der.viz.plots.planar"
-
-    status: Status = "done"
-    message: Text = ""
-    ring: Json
-    section: Json
-    numerics: Json
     states: tuple[PlanarState, ...]
     timing: SolveTime = SolveTime(0.0)
     shapes: Shapes | None = in_memory()  # of the states
@@ -106,21 +86,12 @@ class SqueezePoint(Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Squeeze(Record):
+class Squeeze(RingRecord, name="squeeze of a ring", kind="squeeze", plot="squeeze"):
     """A ring between two points of its plane that are brought together or drawn apart.
 
     `load` reads what `save` or ``der planar --distance`` has written; shapes as with states.
     """
 
-    NAME: ClassVar[str] = "squeeze of a ring"
-    KIND: ClassVar[str] = "squeeze"
-    PLOT: ClassVar[str] = "der.viz.plots.squeeze"
-
-    status: Status = "done"
-    message: Text = ""
-    ring: Json
-    section: Json
-    numerics: Json
     goal: Number  # distance at which the path ends
     distance: Column  # (n,) between the points, a
     force: Annotated[Array, along("distance")]  # draws them apart, GJ/a^2; < 0: holds them together

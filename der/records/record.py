@@ -17,7 +17,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from der.records.codec import record_of
-from der.records.entries import Checked, Number, one_of, plain
+from der.records.entries import Checked, plain
+from der.records.values import Json, Number, Text, one_of
 from der.utils.checks import shown
 from der.utils.files import FilePath, Saved, json_entries, json_lines
 
@@ -100,10 +101,14 @@ class Record(Checked, Shown, Saved):
     """An answer: written as JSON with one entry a line, and read again."""
 
     KIND: ClassVar[str] = ""  # the first entry; "": the file has none
-    PLOT: ClassVar[str]  # the module whose function `draw` makes the figure
+    PLOT: ClassVar[str]  # the module of der.viz.plots whose function `draw` makes the figure
 
     ring: Mapping[str, object]
     timing: SolveTime
+
+    def __init_subclass__(cls, *, name: str = "", kind: str = "", plot: str = "") -> None:
+        super().__init_subclass__()
+        cls.NAME, cls.KIND, cls.PLOT = name, kind, plot
 
     def to_json(self) -> str:
         """JSON text of schema 1, one entry a line."""
@@ -143,7 +148,8 @@ class Record(Checked, Shown, Saved):
 
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
         """The entries after kind and schema."""
-        return ({"kind": self.KIND} if self.KIND else {}) | {"schema": SCHEMA} | entries
+        first = {"kind": self.KIND} if self.KIND else {}
+        return first | {"schema": SCHEMA} | super().on_disk(entries)
 
     @classmethod
     def from_disk(cls, entries: dict[str, Any]) -> dict[str, Any]:
@@ -157,7 +163,7 @@ class Record(Checked, Shown, Saved):
             raise ValueError(f"kind is {shown(kind)}, not {cls.KIND!r}")
         if (schema := entries.pop("schema", None)) != SCHEMA:
             raise ValueError(f"schema is {shown(schema)}, this version reads {SCHEMA}")
-        return entries
+        return super().from_disk(entries)
 
     @property
     def solve_s(self) -> float:
@@ -166,12 +172,23 @@ class Record(Checked, Shown, Saved):
 
     def figure(self) -> Figure:
         """The matplotlib figure of the record."""
-        figure: Figure = import_module(self.PLOT).draw(self)
+        figure: Figure = import_module(f"der.viz.plots.{self.PLOT}").draw(self)
         return figure
 
     def _all_facts(self) -> list[str]:
         """The ring, what is special, and the status."""
         return [str(self.ring.get("shape")), *self.facts(), getattr(self, "status", "done")]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RingRecord(Record):
+    """A record that begins with how it ended, and with the ring, its section and the numerics."""
+
+    status: Status = "done"
+    message: Text = ""  # a sentence about the status
+    ring: Json
+    section: Json
+    numerics: Json
 
 
 def _decoded(content: bytes) -> str:

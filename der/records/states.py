@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from der.records.configurations import Shapes
-from der.records.entries import Checked, Count, Integer, Json, Number, Text, Truth, in_memory
-from der.records.record import Record, SolveTime, Status
+from der.records.entries import Checked, in_memory
+from der.records.record import RingRecord, SolveTime
+from der.records.values import Count, Integer, Number, Text, Truth
 
 
 @dataclass(frozen=True)
@@ -52,22 +52,13 @@ class Transition(Checked):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class States(Record):
+class States(RingRecord, name="states of a ring", kind="states", plot="states"):
     """The states of a ring that were found, lowest first, and the transitions between them.
 
     `load` reads what `save` or ``der states --out`` has written. The shapes of the states are in a
     file of their own, ``der.Shapes.load("shapes.npz")``, in the order of the states.
     """
 
-    NAME: ClassVar[str] = "states of a ring"
-    KIND: ClassVar[str] = "states"
-    PLOT: ClassVar[str] = "der.viz.plots.states"
-
-    status: Status = "done"
-    message: Text = ""
-    ring: Json
-    section: Json
-    numerics: Json
     gamma: Number | None  # rotation of each grip, rad; None: without grips
     states: tuple[RingState, ...]
     transitions: tuple[Transition, ...]

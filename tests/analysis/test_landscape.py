@@ -18,8 +18,9 @@ from der.analysis.landscape.landscape import landscape
 from der.analysis.landscape.over_thickness import barriers_over
 from der.analysis.landscape.surface import energy_surface
 from der.analysis.request import Request
+from der.records.barriers import BarrierCurves
 from der.records.energy_surface import Surface
-from der.records.landscape import BarrierCurves, Landscape, Pass
+from der.records.landscape import Landscape, Pass
 from der.viz.plots.style import save
 
 

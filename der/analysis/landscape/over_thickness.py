@@ -12,7 +12,8 @@ from der.analysis.landscape.landscape import landscape
 from der.continuation.richardson import Extrapolated
 from der.geometry.ring import Ring
 from der.geometry.section import rectangular_section
-from der.records.landscape import BarrierCurves, Landscape, Pass
+from der.records.barriers import BarrierCurves
+from der.records.landscape import Landscape, Pass
 from der.records.record import SolveTime
 from der.scene import Scene
 from der.utils.run import Run

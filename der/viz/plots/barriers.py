@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
-from der.records.landscape import BarrierCurves
+from der.records.barriers import BarrierCurves
 from der.viz.palette import DASHES, QUIET, STABLE, UNSTABLE
 from der.viz.plots.style import blank, entry, label_axes, legend_below, zero_line
 from der.viz.titles import title

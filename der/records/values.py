@@ -1,0 +1,154 @@
+"""The types of entries: numbers, texts, arrays and mappings, each with its check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+
+from der.records.entries import Entry
+from der.utils import checks
+from der.utils.checks import Array
+
+# --- Single values ---------------------------------------------------------------------------
+
+
+def integer(name: str, value: object) -> int:
+    """Return an integer of either sign."""
+    return int(checks.checked_number(name, value, "an integer", float.is_integer))
+
+
+def one_of(allowed: Sequence[str]) -> Entry:
+    """One of some words."""
+    return Entry(lambda name, value: checks.one_of(name, value, allowed))
+
+
+Number = Annotated[float, Entry(checks.checked_number)]
+Count = Annotated[int, Entry(checks.count)]
+Integer = Annotated[int, Entry(integer)]
+Text = Annotated[str, Entry(checks.text)]
+Truth = Annotated[bool, Entry(checks.truth)]
+Json = Annotated[Mapping[str, object], Entry(checks.json_object)]
+
+
+# --- Arrays ----------------------------------------------------------------------------------
+
+Column = Annotated[Array, Entry(checks.numbers, np.ndarray.tolist)]  # (n,), finite
+
+
+def along(name: str) -> Entry:
+    """Finite numbers, as many as another entry has."""
+    return Entry(checks.numbers, np.ndarray.tolist, (name,))
+
+
+def indices(name: str) -> Entry:
+    """Counts, masked where not known, as many as another entry has."""
+    return Entry(checks.counts, np.ma.MaskedArray.tolist, (name,))
+
+
+def gaps(*dims: str | int | None) -> Entry:
+    """Numbers, NaN in memory and null in the file where there is none."""
+
+    def check(name: str, values: Any) -> Array:
+        found = _with_nan(name, values, len(dims))
+        if not found.size:  # rows of a known length that are not there
+            found = found.reshape([n if isinstance(n, int) else len(found) for n in dims])
+        return found
+
+    return Entry(check, _with_null, dims)
+
+
+def table(*columns: str) -> Entry:
+    """Columns (n, k) of finite numbers: an object of lists in the file."""
+
+    def check(name: str, values: Any) -> Array:
+        if not isinstance(values, Mapping):
+            return checks.checked_array(name, values, ("n", len(columns)))
+        if set(values) != set(columns):
+            raise ValueError(f"{name} must have the entries {', '.join(columns)}")
+        found = [checks.numbers(f"{name}.{column}", values[column]) for column in columns]
+        if len({len(column) for column in found}) > 1:
+            raise ValueError(f"{name} must have as many values of every column")
+        return np.column_stack(found)
+
+    return Entry(check, lambda rows: dict(zip(columns, rows.T.tolist(), strict=True)))
+
+
+def numbers(count: int) -> Entry:
+    """A tuple of finite numbers."""
+    return Entry(
+        lambda name, value: tuple(checks.checked_array(name, value, (count,)).tolist()), list
+    )
+
+
+def _with_nan(name: str, values: Any, ndim: int) -> Array:
+    """Nested lists of numbers and None, or an array, as an array with NaN."""
+    plain_array = isinstance(values, np.ndarray) and values.dtype == np.float64
+    if plain_array and values.ndim == ndim and not np.isinf(values).any():
+        return values.copy()
+    if ndim > 1:
+        rows = checks.each(name, values, lambda at, row: _with_nan(at, row, ndim - 1))
+        return np.array(rows, dtype=float)
+    known = checks.each(name, values, _number_or_nan)
+    return np.array(known, dtype=float)
+
+
+def _number_or_nan(name: str, value: Any) -> float:
+    gap = value is None or (isinstance(value, float) and np.isnan(value))
+    return np.nan if gap else checks.checked_number(name, value)
+
+
+def _with_null(values: Array) -> Any:
+    if values.ndim > 1:
+        return [_with_null(row) for row in values]
+    return [None if np.isnan(value) else value for value in values.tolist()]
+
+
+# --- Mappings --------------------------------------------------------------------------------
+
+
+def _object(name: str, value: Any) -> Mapping[Any, Any]:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be an object, got {checks.shown(value)}")
+    return value
+
+
+def _estimates(name: str, given: Any) -> dict[str, tuple[float, float]]:
+    """Values with their errors; null in the file where there are none."""
+    found = {}
+    for key, pair in ({} if given is None else _object(name, given)).items():
+        place = f"{name}.{key}"
+        if isinstance(pair, Mapping):
+            if set(pair) != {"value", "error"}:
+                raise ValueError(f"{place} must have the entries value, error")
+            pair = pair["value"], pair["error"]
+        value, error = checks.checked_array(place, pair, (2,)).tolist()
+        found[key] = value, error
+    return found
+
+
+Estimates = Annotated[
+    Mapping[str, tuple[float, float]],
+    Entry(
+        _estimates,
+        lambda found: {n: {"value": v, "error": e} for n, (v, e) in found.items()} or None,
+    ),
+]
+
+
+def mapping(entry: Entry) -> Entry:
+    """An object whose values are all of one type; null in the file where it is empty."""
+
+    def check(name: str, given: Any) -> dict[str, Any]:
+        known = {} if given is None else _object(name, given)
+        return {key: entry.check(f"{name}.{key}", value) for key, value in known.items()}
+
+    return Entry(check, lambda found: {key: entry.write(v) for key, v in found.items()} or None)
+
+
+def _text_object(name: str, given: Any) -> dict[str, str]:
+    return {key: checks.text(f"{name}.{key}", v) for key, v in _object(name, given).items()}
+
+
+Texts = Annotated[Mapping[str, str], Entry(_text_object, dict)]
