@@ -37,7 +37,7 @@ PARAMETER = "parameter"  # it has a given value
 PLANE = "plane"  # the correction is orthogonal to a direction
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Solution(Generic[S]):
     """An equilibrium, or, where ``reason`` is not CONVERGED, the last iterate."""
 

@@ -111,7 +111,7 @@ class _Path(Generic[S]):
 
     def _advance(self, start: Solution[S], before: Step[S] | None, length: float) -> Step[S]:
         """One accepted step of about ``length``, shortened until Newton's method follows."""
-        options, reason, advice = self.options, Reason.TOO_SHARP, ""
+        options, reason, end = self.options, Reason.TOO_SHARP, start
         length = max(length, 2.0 * options.smallest_step)
         while length > options.smallest_step:
             guess = length * start.tangent if before is None else before.beyond(length)
@@ -123,7 +123,7 @@ class _Path(Generic[S]):
                 iterations=7,
             )
             self.statistics.newton_iterations += end.iterations
-            reason, advice = end.reason, end.advice
+            reason = end.reason
             if end.converged:
                 reason = Reason.TOO_SHARP
                 if self._angle(start, end) < options.sharpest_turn:
@@ -131,8 +131,8 @@ class _Path(Generic[S]):
                     if _orientation(start) == _orientation(end) or step.bulge < _STRAIGHT:
                         return step
                     reason = Reason.OTHER_BRANCH
-                advice = reason.value
             length *= 0.5
+        advice = reason.value if end.converged else end.advice
         raise ContinuationFailed(f"no step forward from {self._place(start)}: {advice}", reason)
 
     def _place(self, at: Solution[S]) -> str:

@@ -51,6 +51,15 @@ def on_curve(u, length, places, rows):
     return away
 
 
+@njit(cache=True)
+def combined(a, x, b, y, c, z):
+    """Return a x + b y + c z of three increments (m,)."""
+    total = np.empty(x.shape[0])
+    for i in range(x.shape[0]):
+        total[i] = a * x[i] + b * y[i] + c * z[i]
+    return total
+
+
 class Interpolant:
     """The polynomial through a step: a cubic, and what solutions within it were found off that.
 

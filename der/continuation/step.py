@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Generic
 
-from der.continuation.interpolant import Interpolant
+from der.continuation.interpolant import Interpolant, combined
 from der.continuation.roots import brent, find_root, smooth_root
 from der.errors import ContinuationFailed, Reason
 from der.problem import PARAMETER, PLANE, Increment, S, Solution, Statistics, System
@@ -64,8 +64,8 @@ class Step(Generic[S]):
         first = self.system.transport(-jump, self.start.tangent)
         u = s / inner(t, jump)
         of_start = s * u * (1.0 + u) / inner(t, first)
-        increment: Increment = s * (1.0 + u) ** 2 * t + of_start * first
-        increment -= u * u * (3.0 + 2.0 * u) * jump
+        of_end, of_jump = s * (1.0 + u) ** 2, -u * u * (3.0 + 2.0 * u)
+        increment: Increment = combined(of_end, t, of_start, first, of_jump, jump)
         return increment
 
     @property

@@ -15,6 +15,7 @@ from numba import njit
 from der.errors import REASONS
 from der.kernels.assembly import assemble, hold
 from der.kernels.block_ldl import factor, inertia, solve_refined
+from der.kernels.quaternions import rotation_vector
 from der.problem import Increment, Solution
 from der.rod.manifold import move
 from der.rod.rod import Rod, State
@@ -24,12 +25,13 @@ from der.rod.supports import Supports
 # which a fold magnifies; later iterates may not get there, close to a branch point
 _CLOSE = 1e-2
 _LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the path
+_NOTHING = np.zeros(0)  # masses of a rod at rest
 
 # what closes the equations
 LOAD_HELD, DIRECTION_HELD, MOMENT_HELD = range(3)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Equilibrium(Solution[State]):
     """An equilibrium of a rod: observables "moment", conjugate to the load, and "energy".
 
@@ -59,16 +61,23 @@ class Equilibrium(Solution[State]):
 
 
 @njit(cache=True)
-def _correct(
+def newton(
     cell, length, mass, rest, stiffness, stretching, measure, closed,
     free, weight, axis, target, turn, turn_axis, pull, reach,
     quat, stretch, force, load, control, along, moment, tolerance, most,
+    begin_quat, begin_stretch, begin_load, masses, known, shift,
 ):  # fmt: skip
-    """Newton's method; ``along`` (m,) is the direction.
+    """Newton's method for an equilibrium, or (``masses`` not empty) for an implicit step in time.
 
-    Rod and supports come field by field: numba is slow to take named tuples apart. For what is
-    returned see `Equilibrium`.
+    Rod and supports come field by field: numba is slow to take named tuples apart. ``along`` (m,)
+    is the direction. The last line is that of `implicit_step`: a step w from the frames at its
+    begin adds M (known + shift w) to the forces; it stops where the matrix is not positive on the
+    conditions, and has no tangent. For what is returned see `Equilibrium` and `Stepped`.
     """
+    moving = masses.shape[0] > 0
+    w, heavy = np.zeros(masses.shape[0]), 0.0
+    if moving:
+        heavy = shift * masses[-1]
     rod = Rod(cell, length, mass, rest, stiffness, stretching, measure, closed)
     held = Supports(free, weight, axis, target, turn, turn_axis, pull, reach)
     n, b = held.free.shape
@@ -85,16 +94,28 @@ def _correct(
     outcome, iteration = 1, 0
     while True:
         system = assemble(rod, held, quat, stretch, force, load)
-        residual = _residual(held, system, control, moment)
+        rest = residual = _residual(held, system, control, moment)
+        goal = moment
+        if moving:
+            _step_so_far(held.free, begin_quat, begin_stretch, quat, stretch, w)
+            w[-1] = load - begin_load
+            goal -= masses[-1] * known[-1] + heavy * w[-1]
+            _add_inertia(held.free, masses, known, shift, w, system.grad, system.diag)
+            residual = _residual(held, system, control, goal)
         first = residual if iteration == 0 else first
-        if not np.isfinite(residual) or (iteration > 1 and residual > 1e3 * max(first, 1.0)):
+        grown = not moving and iteration > 1 and residual > 1e3 * max(first, 1.0)
+        if grown or not np.isfinite(residual):
             outcome = 2
             break
         if system.bent_too_far >= 0:
             outcome = 3
             break
-        wanted = tolerance if iteration > 1 or iteration == most else _CLOSE * tolerance
+        early = not moving and iteration <= 1 and iteration < most
+        wanted = _CLOSE * tolerance if early else tolerance
         done = residual <= max(wanted, 10.0 * system.noise)
+        if done and moving:
+            outcome = 0
+            break
         if not done and iteration >= most:
             break
         diag, off, border, column = system.diag, system.off, system.border, system.load_column
@@ -112,27 +133,33 @@ def _correct(
         factors = factor(diag, off, border)
         # the closing row: of the direction for the tangent, else that of the control
         last, last_border, corner = row, no_border, along[-1]
-        if done:
+        if done or moving:
             negative, _ = inertia(factors)
+        if done:
             z[0] = 1.0
         elif control == 0:
             last, corner = no_row, 1.0
         elif control == 2:
-            last, last_border, corner = column, system.load_border, system.load_hess
-            z[0] = moment - system.load_grad
-        solved = factors.negative >= 0 and solve_refined(
-            diag,
-            off,
-            factors,
-            n_c,
-            column,
-            system.load_border,
-            last,
-            last_border,
-            corner,
-            x,
-            y,
-            z,
+            last, last_border, corner = column, system.load_border, system.load_hess + heavy
+            z[0] = goal - system.load_grad
+        positive = not moving or negative == n_c
+        solved = (
+            positive
+            and factors.negative >= 0
+            and solve_refined(
+                diag,
+                off,
+                factors,
+                n_c,
+                column,
+                system.load_border,
+                last,
+                last_border,
+                corner,
+                x,
+                y,
+                z,
+            )
         )
         if not solved:
             outcome = 4
@@ -156,7 +183,30 @@ def _correct(
     # plain tuples: to make a named one runs Python, in which Ctrl-C would end the process
     values = (system.energy, system.load_grad, moment_rate)
     ends = (outcome, system.bent_too_far, iteration, residual, negative)
-    return (quat, stretch, force, load), change, values, ends
+    return (quat, stretch, force, load), change, values, ends, (w, rest)
+
+
+@njit(cache=True)
+def _step_so_far(free, begin_quat, begin_stretch, quat, stretch, out_w):
+    """Rotation vectors and stretches of the free unknowns since the begin of a step in time."""
+    turns = rotation_vector(begin_quat, quat)
+    n, b = free.shape
+    for j in range(n):
+        for i in range(b):
+            if free[j, i]:
+                out_w[j * b + i] = turns[j, i] if i < 3 else stretch[j] - begin_stretch[j]
+
+
+@njit(cache=True)
+def _add_inertia(free, masses, known, shift, w, out_grad, out_diag):
+    """Add the forces of inertia M (known + shift w) to the gradient, and shift M to the Hessian."""
+    n, b = free.shape
+    for j in range(n):
+        for i in range(b):
+            if free[j, i]:
+                k = j * b + i
+                out_grad[j, i] += masses[k] * (known[k] + shift * w[k])
+                out_diag[j, i, i] += masses[k] * shift
 
 
 @njit(cache=True)
@@ -215,23 +265,21 @@ def correct(
     closing : what is held, and the value of dL/dload where that is it.
     """
     control, moment = closing
-    state, tangent, values, ends = _correct(
-        *rod, *supports, *start, control, along, moment, tolerance, iterations
+    still = (start.quat, start.stretch, start.load, _NOTHING, _NOTHING, 0.0)
+    state, tangent, values, ends, _ = newton(
+        *rod, *supports, *start, control, along, moment, tolerance, iterations, *still
     )
     energy, conjugate, rate = values
     outcome, where, taken, residual, negative = ends
     load_rate = float(tangent[-1])
     return Equilibrium(
-        state=State(*state),
-        parameter=state[-1],
-        tangent=tangent,
-        observables={
-            "moment": (conjugate, rate),
-            "energy": (energy, conjugate * load_rate),
-        },
-        index=negative - len(supports.target) if negative >= 0 else None,
-        reason=REASONS[outcome],
-        detail=f"vertex {where}" if where >= 0 else "",
-        iterations=taken,
-        residual=residual,
+        State(*state),
+        state[-1],
+        tangent,
+        {"moment": (conjugate, rate), "energy": (energy, conjugate * load_rate)},
+        negative - len(supports.target) if negative >= 0 else None,
+        REASONS[outcome],
+        f"vertex {where}" if where >= 0 else "",
+        taken,
+        residual,
     )

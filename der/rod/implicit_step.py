@@ -1,4 +1,4 @@
-"""One implicit step in time of a rod with masses: Newton's method with the rod's own factors.
+"""One implicit step in time of a rod with masses, by the Newton's method of its equilibria.
 
 The step from frames q0 looks for q = q0 o exp(w/2) at which
 
@@ -18,16 +18,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from der.errors import REASONS, Reason
-from der.kernels.assembly import assemble, take_out
-from der.kernels.block_ldl import factor, inertia, solve_refined
-from der.kernels.quaternions import Array, into_frame, rotation_vector, turned
+from der.kernels.quaternions import Array
+from der.rod.equilibrium import LOAD_HELD, MOMENT_HELD, newton
 from der.rod.rod import Rod, State
 from der.rod.supports import Supports, check_cut
 
-_LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the neighbourhood
 _ITERATIONS = 6  # a step that needs more is too long
 
 
@@ -49,136 +46,6 @@ def weights(rod: Rod, supports: Supports) -> Array:
     """Masses (n b + 1,) of all unknowns, held ones 0; the load's is the rod's whole length."""
     own = rod.length[:, None] * supports.free
     return np.append(own.ravel(), rod.length.sum())
-
-
-@njit(cache=True)
-def _step(
-    rod,
-    supports,
-    begin_quat,
-    begin_stretch,
-    begin_load,
-    quat,
-    stretch,
-    force,
-    load,
-    mass,
-    known,
-    shift,
-    frees_load,
-    moment,
-    tolerance,
-):
-    """Newton's method for one step; see the module's text."""
-    n, b = supports.free.shape
-    n_c = supports.target.shape[0]
-    quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
-    x, y, z = np.zeros((n, b, 1)), np.zeros((n_c, 1)), np.zeros(1)
-    no_row, no_border = np.zeros((n, b)), np.zeros(n_c)
-    w, axis = np.zeros(n * b + 1), np.empty(3)
-    outcome, iteration, residual = 1, 0, 0.0
-    while True:
-        system = assemble(rod, supports, quat, stretch, force, load)
-        if system.bent_too_far >= 0:
-            outcome = 3
-            break
-        turns = rotation_vector(begin_quat, quat)
-        largest, residual = 0.0, 0.0
-        for k in range(n_c):
-            largest = max(largest, abs(system.gap[k]))
-        residual = largest
-        for j in range(n):
-            for i in range(b):
-                k = j * b + i
-                x[j, i, 0] = 0.0
-                if not supports.free[j, i]:
-                    system.load_column[j, i] = 0.0
-                    continue
-                w[k] = turns[j, i] if i < 3 else stretch[j] - begin_stretch[j]
-                rest = system.grad[j, i]
-                residual = max(residual, abs(rest))
-                x[j, i, 0] = -rest - mass[k] * (known[k] + shift * w[k])
-                system.diag[j, i, i] += mass[k] * shift
-                if not abs(x[j, i, 0]) <= largest:  # true for NaN, too
-                    largest = abs(x[j, i, 0])
-        if frees_load:
-            w[-1] = load - begin_load
-            rest = system.load_grad - moment
-            residual = max(residual, abs(rest))
-            z[0] = -rest - mass[-1] * (known[-1] + shift * w[-1])
-            largest = max(largest, abs(z[0]))
-        if not np.isfinite(largest):
-            outcome = 2
-            break
-        if largest <= max(tolerance, 10.0 * system.noise):
-            outcome = 0
-            break
-        if iteration >= _ITERATIONS:
-            break
-        diag, off, border = take_out(supports.free, system.diag, system.off, system.border)
-        factors = factor(diag, off, border)
-        negative, _ = inertia(factors)
-        if negative != n_c:
-            outcome = 4
-            break
-        last, last_border, corner = no_row, no_border, 1.0
-        if frees_load:
-            last, last_border = system.load_column, system.load_border
-            corner = system.load_hess + mass[-1] * shift
-        for k in range(n_c):
-            y[k, 0] = -system.gap[k]
-        if not solve_refined(
-            diag,
-            off,
-            factors,
-            n_c,
-            system.load_column,
-            system.load_border,
-            last,
-            last_border,
-            corner,
-            x,
-            y,
-            z,
-        ):
-            outcome = 4
-            break
-        if not frees_load:
-            z[0] = 0.0
-        size = abs(z[0])
-        for j in range(n):
-            for i in range(3):
-                size = max(size, abs(x[j, i, 0]))
-        if not size < _LARGEST_TURN:
-            outcome = 2
-            break
-        for j in range(n):
-            for i in range(3):
-                axis[i] = x[j, i, 0]
-            if supports.turn[j] != 0.0:
-                into_frame(quat[j], supports.turn_axis, axis)
-                for i in range(3):
-                    axis[i] *= supports.turn[j] * z[0]
-            turned(quat[j], axis, quat[j])
-            if b == 4:
-                stretch[j] += x[j, 3, 0]
-        for k in range(n_c):
-            force[k] += y[k, 0]
-        load += z[0]
-        iteration += 1
-    return (
-        outcome,
-        system.bent_too_far,
-        iteration,
-        quat,
-        stretch,
-        force,
-        load,
-        w,
-        system.energy,
-        system.load_grad,
-        residual,
-    )
 
 
 def step(
@@ -212,25 +79,16 @@ def step(
     on the conditions is `Reason.SINGULAR`. A shorter step helps.
     """
     check_cut(rod, supports.free)
-    outcome, where, iterations, quat, stretch, force, load, w, energy, now, residual = _step(
-        rod,
-        supports,
-        begin.quat,
-        begin.stretch,
-        float(begin.load),
-        guess.quat,
-        guess.stretch,
-        guess.force,
-        float(guess.load),
-        mass,
-        known,
-        shift,
-        moment is not None,
-        0.0 if moment is None else moment,
-        tolerance,
-    )
-    state = State(quat, stretch, force, load)
-    return Stepped(state, REASONS[outcome], where, iterations, w, energy, now, residual)
+    along = np.zeros(supports.free.size + len(supports.target) + 1)
+    control = LOAD_HELD if moment is None else MOMENT_HELD
+    state, _, values, ends, (w, rest) = newton(
+        *rod, *supports, *guess.but(load=float(guess.load)),
+        control, along, moment or 0.0, tolerance, _ITERATIONS,
+        begin.quat, begin.stretch, float(begin.load), mass, known, shift,
+    )  # fmt: skip
+    energy, conjugate, _ = values
+    outcome, where, iterations, _, _ = ends
+    return Stepped(State(*state), REASONS[outcome], where, iterations, w, energy, conjugate, rest)
 
 
 def on_the_conditions(rod: Rod, supports: Supports, start: State) -> Stepped:

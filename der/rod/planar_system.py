@@ -22,7 +22,7 @@ class PlanarConfiguration(NamedTuple):
     load: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PlanarEquilibrium(Solution[PlanarConfiguration]):
     """An equilibrium of a planar rod: observables "moment", conjugate to the load, and "energy"."""
 
