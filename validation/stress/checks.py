@@ -19,7 +19,7 @@ from der.records.configurations import Shapes
 from der.records.path import NUMBERS, Path, Point
 from der.scene import Scene
 from der.utils.checks import Array
-from validation.stress.random_rings import DENSE, LOOSE, largest_error, work_missing
+from validation.stress.random_rings import DENSE, largest_error, work_missing
 
 Fault = tuple[str, str]  # a name, which is the reason in the summary, and a sentence
 
@@ -191,11 +191,6 @@ def _part(path: Path, low: int, high: int) -> Path:
     columns = (*NUMBERS, "index", "index_moment")
     entries: dict[str, Any] = {name: getattr(path, name)[keep] for name in columns}
     return replace(path, **entries, points=(), error=None, raw=None, shapes=None)
-
-
-def is_work(path: Path) -> bool:
-    """Whether energy is work to what interpolation between the states can tell."""
-    return work_lost(path) <= LOOSE
 
 
 def too_uncertain(path: Path, tolerance: float) -> Iterator[Fault]:
