@@ -56,9 +56,7 @@ class Sector:
 
     def flat(self, s: Array) -> Array:
         """Frames of the flat ring, (..., 4)."""
-        half = 0.5 * (self.ring.angle(self.begin + s) - 0.5 * np.pi)
-        zero = np.zeros_like(half)
-        return np.stack([np.cos(half), np.sin(half), zero, zero], axis=-1)
+        return _flat(self.ring, self.begin + s)
 
     def flat_constants(self) -> Array:
         """Constants p of the flat ring: the moment that closes it, if it was bent to be closed."""
@@ -67,6 +65,13 @@ class Sector:
         if ratio != 1.0:  # a circle, of curvature 1
             p[1 if self.piece.quarter else 0] = self.piece.stiffness[0] * (1.0 - ratio)
         return p
+
+
+def _flat(ring: Ring, s: Array) -> Array:
+    """Frames (..., 4) of the flat ring at arc lengths of its own."""
+    half = 0.5 * (ring.angle(s) - 0.5 * np.pi)
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), np.sin(half), zero, zero], axis=-1)
 
 
 def sector(scene: Scene) -> Sector:
@@ -89,10 +94,7 @@ def sector(scene: Scene) -> Sector:
     inside = [s - begin for s in ring.kinks if begin + margin < s < begin + length - margin]
     # a straight that rounding leaves between two fillets is none
     inside = [a for a, b in pairwise([*inside, length]) if b - a > margin]
-    ends = np.array([begin, begin + length])
-    half = 0.5 * (ring.angle(ends) - 0.5 * np.pi)
-    zero = np.zeros(2)
-    start, end = np.stack([np.cos(half), np.sin(half), zero, zero], axis=-1)
+    start, end = _flat(ring, np.array([begin, begin + length]))
     section = scene.section
     stiffness = np.array([section.alpha, section.beta, 1.0])
     piece = Piece(quarter, stiffness, start, end, QUARTER if quarter else HALF)

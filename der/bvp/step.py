@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from der import problem
 from der.bvp.collocation import Collocation, Direction, Solution, required
 from der.bvp.gauss import Array
 from der.bvp.meshes import Mesh
@@ -23,11 +25,9 @@ NEAR = 0.1  # of a step: solutions at a given gamma that lie farther from the cu
 
 
 @dataclass
-class Statistics:
+class Statistics(problem.Statistics):
     """What a solve has cost so far."""
 
-    newton_iterations: int = 0
-    steps: int = 0
     intervals: int = 0  # of all steps, those to be repeated included
 
 
@@ -40,15 +40,21 @@ class Step:
     end: Solution
     length: float
     statistics: Statistics
-    jump: Direction = field(init=False)
-    cosine: float = field(init=False)  # of the angle between the tangents at both ends
-    _found: dict[float, Solution] = field(init=False)  # by s
 
-    def __post_init__(self) -> None:
-        a, b = self.start, self.end
-        object.__setattr__(self, "jump", b.unknowns.plus(-1.0, a.unknowns))
-        object.__setattr__(self, "cosine", dot(a.mesh, a.tangent, b.tangent))
-        object.__setattr__(self, "_found", {0.0: a, self.length: b})
+    @cached_property
+    def jump(self) -> Direction:
+        """The change of the unknowns from the start to the end."""
+        return self.end.unknowns.plus(-1.0, self.start.unknowns)
+
+    @cached_property
+    def cosine(self) -> float:
+        """Cosine of the angle between the tangents at both ends."""
+        return dot(self.start.mesh, self.start.tangent, self.end.tangent)
+
+    @cached_property
+    def _found(self) -> dict[float, Solution]:
+        """The solutions that are known, by s."""
+        return {0.0: self.start, self.length: self.end}
 
     def _weights(self, s: float) -> tuple[float, float, float]:
         """Weights of the tangent at the start, the jump and the tangent at the end in the cubic."""

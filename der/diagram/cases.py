@@ -6,9 +6,9 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from typing import Any
 
@@ -182,12 +182,16 @@ def solve_case(case: Case) -> Row:
     from der.bvp.solve import solve_bvp  # kernels: only where cases are solved, not where counted
 
     started = time.perf_counter()
-    try:
-        path = solve_bvp(case.scene(save_at=()), tolerance=case.tolerance)
-        row = row_of(case, path)
-    except Exception as problem:  # whatever it is, it must not take the other cases along
-        row = failed(case, f"{type(problem).__name__}: {problem}")
+    row = row_by(case, partial(solve_bvp, tolerance=case.tolerance), save_at=())
     return replace(row, seconds=round(time.perf_counter() - started, 6))
+
+
+def row_by(case: Case, solve: Callable[[Scene], Path], **wanted: Any) -> Row:
+    """How a case folds by a solver, and what else is wanted of its scene; nothing is raised."""
+    try:
+        return row_of(case, solve(case.scene(**wanted)))
+    except Exception as problem:  # whatever it is, it must not take the other cases along
+        return failed(case, f"{type(problem).__name__}: {problem}")
 
 
 def failed(case: Case, why: str) -> Row:

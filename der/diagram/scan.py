@@ -242,27 +242,14 @@ def _progress(family: Family, *, shown: bool) -> Iterator[Level]:
     if not (shown and sys.stderr.isatty()):
         yield lambda edge, nodes, todo: None
         return
+    from rich import progress
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("cases,"),
-        TimeElapsedColumn(),
-        TextColumn("gone,"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
+        *("{task.description}", progress.BarColumn(), progress.MofNCompleteColumn(), "cases,"),
+        *(progress.TimeElapsedColumn(), "gone,", progress.TimeRemainingColumn(), "left"),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(family.name, total=None)
         done = 0
 

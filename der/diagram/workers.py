@@ -15,30 +15,11 @@ from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import wait
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from der.utils.interrupts import interrupts_ignored
 
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-
-class Workers(Protocol):
-    """What a scan needs to know of its executor."""
-
-    executor: Executor
-
-    @property
-    def width(self) -> int:
-        """How many tasks are done at a time."""
-
-    def restart(self) -> None:
-        """Replace an executor that broke."""
-
-    def close(self) -> None:
-        """End them once their work is done."""
-
-    def stop(self) -> None:
-        """End at once; tasks in flight are lost."""
 
 
 def died(problem: BaseException) -> bool:
@@ -149,6 +130,9 @@ class Cluster:
         """Take back what is not done, and leave."""
         self.executor.shutdown(wait=False)
         self._client.close()
+
+
+Workers: TypeAlias = Processes | Cluster
 
 
 def processes(number: int | None) -> int:

@@ -195,7 +195,7 @@ class _Search:
         return []
 
     def _condition(self, kind: str) -> Function[Value]:
-        condition = KINDS[kind].condition
+        condition = KINDS[kind]
 
         def value(u: Array, seed: Value) -> tuple[float, Value]:
             try:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -278,21 +277,10 @@ def _root(system: Collocation, at: Solution, value: Callable[[Solution], float])
     raise NotFound("no such state nearby on the path")
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A kind of boundary with its condition."""
-
-    name: str
-    condition: Condition
-
-
-KINDS = {
-    name: Kind(name, condition)
-    for name, condition in (
-        ("stability", stability),
-        ("foldability", foldability),
-        ("infinite slope", infinite_slope),
-        ("snap-back", snap_back),
-        ("exchange", exchange),
-    )
+KINDS: dict[str, Condition] = {
+    "stability": stability,
+    "foldability": foldability,
+    "infinite slope": infinite_slope,
+    "snap-back": snap_back,
+    "exchange": exchange,
 }

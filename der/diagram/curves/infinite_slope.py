@@ -24,6 +24,7 @@ from der.bvp.collocation import Direction, required
 from der.bvp.gauss import Array
 from der.diagram.curves.branch_exchange import Shot, shot
 from der.diagram.curves.conditions import NotFound, Value, scaled
+from der.diagram.curves.tracing import by_differences
 from der.errors import ContinuationFailed
 from der.scene import Scene
 
@@ -133,10 +134,5 @@ def _left(scene_at: SceneAt, place: Array, seed: Value, planar: Array) -> tuple[
 
 
 def _rates(left: Callable[[Array], Array], z: Array, now: Array) -> Array:
-    """Derivatives, by differences; parameters towards the middle of the square."""
-    columns = []
-    for k in range(len(z)):
-        step = np.zeros_like(z)
-        step[k] = DIFFERENCE * (1.0 + abs(z[k])) * (-1.0 if z[k] > 0.5 else 1.0)
-        columns.append((left(z + step) - now) / step[k])
-    return np.array(columns).T
+    """Derivatives, by differences."""
+    return by_differences(left, z, now, DIFFERENCE * (1.0 + np.abs(z)))
