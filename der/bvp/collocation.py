@@ -137,19 +137,10 @@ class Collocation:
         )
         if status != CONVERGED and not (status == SLOW and tolerance == 0.0):
             return Failure(REASONS[status], done)
+        energy *= self.sector.copies
+        rates = Direction(tangent, tangent_p, tangent_gamma)
         return Solution(
-            mesh,
-            frames,
-            p,
-            gamma,
-            moment,
-            self.sector.copies * energy,
-            Direction(tangent, tangent_p, tangent_gamma),
-            rate,
-            orientation,
-            nodes,
-            places,
-            done,
+            mesh, frames, p, gamma, moment, energy, rates, rate, orientation, nodes, places, done
         )
 
     def flat(self, n: int) -> Solution | Failure:

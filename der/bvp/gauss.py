@@ -43,19 +43,11 @@ def rule(stages: int = STAGES) -> Rule:
     partial = np.asarray(np.linalg.solve(powers.T, rows.T).T, dtype=np.float64)
     slope = np.asarray(np.linalg.inv(partial), dtype=np.float64)
     last = weights @ slope
+    first = 1.0 - float(last.sum())
     places = np.append(0.5 * points, 0.5 + 0.5 * points)
-    return Rule(
-        points,
-        weights,
-        partial,
-        slope,
-        slope.sum(axis=1),
-        last,
-        1.0 - float(last.sum()),
-        interpolation(np.append(0.0, points), places),
-        interpolation(points, places),
-        top_derivative(points),
-    )
+    halves = interpolation(np.append(0.0, points), places), interpolation(points, places)
+    sums, top = slope.sum(axis=1), top_derivative(points)
+    return Rule(points, weights, partial, slope, sums, last, first, *halves, top)
 
 
 def interpolation(sites: Array, places: Array) -> Array:

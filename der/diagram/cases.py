@@ -234,17 +234,12 @@ def label_of(foldable: bool, stable: bool | None, snapping: str) -> str:
 
 def _error(path: Path) -> float | None:
     """Largest estimated error of a path, relative; None where one is not known."""
-    if path.error is None:
-        return None
     bars: Any = path.error
-    scales = (math.pi, float(np.abs(path.moment).max()))
-    parts = [
-        value / scale
-        for name, scale in zip(("gamma", "moment"), scales, strict=True)
-        for value in bars[name]
-        if value is not None
-    ]
-    return float(max(parts, default=math.nan)) if len(parts) == 2 * len(path) else None
+    if bars is None or None in (*bars["gamma"], *bars["moment"]):
+        return None
+    largest = float(np.abs(path.moment).max())
+    parts = [bar / math.pi for bar in bars["gamma"]] + [bar / largest for bar in bars["moment"]]
+    return float(max(parts))
 
 
 @cache

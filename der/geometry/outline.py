@@ -7,7 +7,7 @@ counter-clockwise; halfway, at s = L/2, it crosses the positive second axis. Its
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Protocol, TypeAlias
+from typing import ClassVar, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,6 +175,8 @@ class Ellipse:
 
     across: float  # semi-axis along the first axis
     along: float  # semi-axis along the second
+    breaks: ClassVar[tuple[float, ...]] = ()  # its curvature is analytic
+    kinks: ClassVar[tuple[float, ...]] = ()
 
     @cached_property
     def length(self) -> float:
@@ -182,16 +184,6 @@ class Ellipse:
         from scipy.special import ellipe
 
         return 4 * self.across * float(ellipe(self._m))
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """No jumps in curvature."""
-        return ()
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """None: its curvature is analytic."""
-        return ()
 
     def angle(self, s: Array) -> Array:
         """Tangent angle at `s`."""

@@ -40,7 +40,6 @@ from der.diagram.curves.pruning import (
     beside,
     pieces_of,
     unlike,
-    where,
 )
 from der.diagram.curves.slices import Boundaries, Slice, SliceCases, Solve, joined, slices
 from der.diagram.curves.tracing import At, Function, States, corrected, trace
@@ -131,13 +130,17 @@ class _Search:
 
     # --- curves of a condition ---
 
-    def _trace(self, crossing: Crossing, lines: list[Line]) -> None:
-        """Add the curves that may bound what differs between two cases, until one does."""
+    def _trace(self, crossing: Crossing, lines: list[Line], *, one_new: bool = False) -> None:
+        """Add the curves that may bound what differs between two cases, until one does.
+
+        ``one_new``: or until one is found that is not known.
+        """
         for kind in _bounding(crossing.kind):
             points = self._traced(kind, crossing)
-            if points and not _known(kind, points, lines):
+            new = bool(points) and not _known(kind, points, lines)
+            if new:
                 lines.append(Line(kind, points, [None] * len(points)))
-            if points and _explained(crossing, lines):
+            if new if one_new else points and _explained(crossing, lines):
                 return
 
     def _continued(
@@ -150,7 +153,7 @@ class _Search:
             ends = [end for end in _loose(kept, met) if distance(end, np.array(asked)) > BESIDE]
             asked += ends
             for crossing in self.cases.bisected(self._around(ends, kept), NEAREST):
-                self._trace_all(crossing, lines)
+                self._trace(crossing, lines, one_new=True)
             if len(lines) == before:
                 break
             kept, met = self._kept(lines)
@@ -172,14 +175,6 @@ class _Search:
                     if not any([*meetings(chord, line.places)] for line in bounding):
                         found.append(Crossing(kind, a, b, first, second))
         return found
-
-    def _trace_all(self, crossing: Crossing, lines: list[Line]) -> None:
-        """Add the first curve that is not known and may bound what differs between two cases."""
-        for kind in _bounding(crossing.kind):
-            points = self._traced(kind, crossing)
-            if points and not _known(kind, points, lines):
-                lines.append(Line(kind, points, [None] * len(points)))
-                return
 
     def _traced(self, kind: str, crossing: Crossing) -> list[At[Value]]:
         """The curve between two cases, followed to its ends; none where no condition finds one."""
@@ -246,7 +241,7 @@ class _Search:
         """Pieces of curves on whose two sides the modes differ by their kind, and their corners."""
         lines = [Line(line.kind, list(line.points), [None] * len(line.points)) for line in lines]
         met = mark_corners(lines, self._condition)
-        asked = [(n, k) for n, line in enumerate(lines) for k in where(asked_beside(line))]
+        asked = [(n, k) for n, line in enumerate(lines) for k in asked_beside(line)]
         holds: list[list[bool | None]] = [[None] * len(line.points) for line in lines]
         for _ in range(SHARPER):
             for (n, k), held in zip(asked, self._hold(lines, asked), strict=True):

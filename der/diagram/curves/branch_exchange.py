@@ -86,16 +86,8 @@ def _shoot(piece, h, rest, frames, p, gamma, iterations, tolerance):
 def shot(system: Collocation, mesh: Mesh, frames: Array, x: Array) -> Shot:
     """The rod shot with p and gamma, from frames nearby."""
     frames = frames.copy()
-    ok, nodes, places, missed, rates = _shoot(
-        system.sector.piece,
-        mesh.h,
-        mesh.rest,
-        frames,
-        x[:-1].copy(),
-        x[-1],
-        12,
-        SHOT,
-    )
+    piece, p = system.sector.piece, x[:-1].copy()
+    ok, nodes, places, missed, rates = _shoot(piece, mesh.h, mesh.rest, frames, p, x[-1], 12, SHOT)
     return Shot(frames, nodes, places, missed, rates, ok and bool(np.isfinite(rates).all()))
 
 

@@ -107,7 +107,7 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
                 ends = line.points[k : k + 2]
                 u = 0.5 * (ends[0].u + ends[1].u)
                 met = None
-                for at in _starts(ends, u, condition(kind)):
+                for at in chain(ends, _led(ends, u, condition(kind))):  # those that cost most last
                     try:
                         met = _solved((kind, touched), u, (at.state,) * 2, condition, value)
                         break
@@ -154,12 +154,6 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
         if all(nearest(met.first.u, line.places)[1] < ASIDE for line in (one, other)):
             return met
     return None
-
-
-def _starts(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Iterator[At[Value]]:
-    """Points of a curve from which one near ``u`` is sought, those that cost most last."""
-    yield from ends
-    yield from _led(ends, u, condition)
 
 
 def _led(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Iterator[At[Value]]:

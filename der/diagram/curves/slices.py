@@ -117,16 +117,13 @@ class SliceCases:
         left.sort(key=lambda item: tuple(item[0]))
         chain: list[tuple[Array, BoundaryPoint]] = []
         while left:
-            if chain:
-                apart = [float(np.linalg.norm(u - chain[-1][0])) for u, _ in left]
-                k = int(np.argmin(apart))
-                if apart[k] > 3.0 / self.family.coarse:
-                    yield tuple(p for _, p in chain)
-                    chain = []
-                    continue
-                chain.append(left.pop(k))
+            apart = [float(np.linalg.norm(u - chain[-1][0])) if chain else 0.0 for u, _ in left]
+            k = int(np.argmin(apart))
+            if apart[k] > 3.0 / self.family.coarse:
+                yield tuple(p for _, p in chain)
+                chain = []
             else:
-                chain.append(left.pop(0))
+                chain.append(left.pop(k))
         if chain:
             yield tuple(p for _, p in chain)
 
