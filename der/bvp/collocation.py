@@ -1,4 +1,4 @@
-"""Solutions of a sector's boundary-value problem: solved for, moved between meshes, judged."""
+"""Solutions of a sector's boundary-value problem: solver, change of mesh, error estimate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ REASONS = {
     SLOW: Reason.TOO_MANY_ITERATIONS,
     SINGULAR: Reason.SINGULAR,
 }
-CLOSE = 1e-9  # last increment; rates and places are those before it
+CLOSE = 1e-9  # last increment; rates and positions are those before it
 
 
 class Direction(NamedTuple):
@@ -49,7 +49,7 @@ class Solution(NamedTuple):
     energy: float  # U of the full ring, GJ/a
     tangent: Direction
     moment_rate: float  # dM along the tangent
-    orientation: int  # sign of the determinant, the same all along a path
+    orientation: int  # sign of the determinant, constant along a path
     nodes: Array  # (n + 1, 4) frames and
     places: Array  # (n + 1, 3) positions less the first, at the mesh points
     iterations: int
@@ -101,7 +101,7 @@ def required(found: Solution | Failure, message: str) -> Solution:
 
 
 class Error(NamedTuple):
-    """What a solution changes by on a mesh of half the intervals' length."""
+    """The change of a solution on a mesh with halved intervals."""
 
     gamma: float
     moment: float

@@ -2,7 +2,7 @@
 
 Stages at the m Gauss points of [0, 1]; the collocation polynomial has degree m, the values at the
 ends of intervals are accurate to h^(2m) (de Boor & Swartz 1973; Ascher, Mattheij & Russell 1995,
-section 5.4). All is exact to rounding: computed from Legendre polynomials, not tabulated.
+section 5.4). The tables are exact to rounding: computed from Legendre polynomials.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Rule(NamedTuple):
     last: Array  # (m,) b A^-1: the right end from the stages
     first: float  # and from the left end, 1 - sum(last)
     halves: Array  # (2 m, m + 1) left end and stages -> stages of the two halves
-    halves_inner: Array  # (2 m, m) the same from the stages alone, one order less
+    halves_inner: Array  # (2 m, m) the same from the stages only, one order less
     top: Array  # (m + 1,) left end and stages -> m-th derivative of the polynomial
 
 

@@ -88,7 +88,7 @@ class Step:
 
     @property
     def bulge(self) -> float:
-        """How far the end lies beside the tangent at the start, over the length."""
+        """Distance of the end from the tangent at the start, over the length."""
         square = dot(self.start.mesh, self.jump, self.jump)
         return float(max(square / self.length**2 - 1.0, 0.0) ** 0.5)
 
@@ -115,7 +115,7 @@ class Step:
             if found is not None and self._near(found, guess):
                 s = along(self.start, found.unknowns)
                 return s, self._found.setdefault(s, found)
-        # close to a fold gamma is a bad coordinate, s is not
+        # close to a fold gamma is a bad coordinate, but s is a good one
         ends = (low, self.at(low)), (high, self.at(high))
         s, found = self.change(lambda at: at.gamma - gamma, *ends)
         return s, found._replace(gamma=gamma)
@@ -136,7 +136,7 @@ class Step:
         return s, self.at(s)
 
     def _near(self, found: Solution, there: Direction) -> bool:
-        """Whether a solution found at given gamma lies where the cubic expects it."""
+        """Whether a solution found at given gamma is near the one that the cubic predicts."""
         away = found.unknowns.plus(-1.0, there)._replace(gamma=0.0)
         return dot(self.start.mesh, away, away) < (NEAR * self.length) ** 2
 
@@ -148,7 +148,7 @@ class Step:
     def beyond(self, length: float) -> Direction:
         """Unknowns at a distance beyond the end, measured along the tangent there."""
         guess = self.expected(self.length + length * self.cosine)
-        # of the distance, which the cubic does not know
+        # the cubic does not know the distance along the tangent
         return guess.plus(length - along(self.end, guess), self.end.tangent)
 
 

@@ -104,8 +104,8 @@ def phase_diagram(
 ) -> PhaseDiagram:
     """The phase diagram of a family of rings, written to a folder.
 
-    Every finished case is in `cases.jsonl` at once, so that a run that ends in whatever way, and is
-    resumed, loses none but those in flight. Afterwards `cases.csv`, `boundaries.csv`,
+    Every finished case is in `cases.jsonl` at once, so that a run that is stopped and resumed loses
+    only the cases in flight. Afterwards `cases.csv`, `boundaries.csv`,
     `corners.csv`, NAME.png, and `check.csv` are written.
 
     Parameters
@@ -159,7 +159,7 @@ def phase_diagram(
 
 
 def doubts(diagram: PhaseDiagram) -> list[str]:
-    """In what the boundaries of a diagram are not complete, a line each; none if they are."""
+    """What the boundaries of a diagram lack, a line each; none if they are complete."""
     family, curves = diagram.family, diagram.curves
     lines = []
     if left := unexplained(diagram.scan, curves):
@@ -168,7 +168,7 @@ def doubts(diagram: PhaseDiagram) -> list[str]:
         case = ends[0].case
         place = ", ".join(f"{name} = {getattr(case, name):.6g}" for name in family.parameters)
         lines.append(
-            f"ends of boundaries that lead nowhere: {len(ends)}, the first with {place}, "
+            f"loose ends of boundaries: {len(ends)}, the first with {place}, "
             f"about {case.twist_axis}"
         )
     return lines
@@ -215,7 +215,7 @@ def _written(
     compared: tuple[Compared, ...],
     beside: Sequence[Row],
 ) -> tuple[File, ...]:
-    """Write boundaries, check and picture; the table of cases has long been written."""
+    """Write boundaries, check and picture; the table of cases is already there."""
     from der.diagram.picture import picture
     from der.viz.plots.phase_diagram import draw
     from der.viz.plots.style import save

@@ -72,13 +72,13 @@ class Family:
     def case(self, sheet: str, unit: Sequence[float]) -> Case:
         """The case at unit coordinates, each from 0 to 1.
 
-        A ring with b = a is the same about both axes, and said to be twisted about x.
+        A ring with b = a is the same about both axes; its axis is x.
         """
         values = dict(self.fixed)
         for name, part in zip(self.parameters, unit, strict=True):
             low, high = self.bounds(name, values)
             value = min(round(low + (high - low) * part, DIGITS), high)
-            # the widest fillet to the last bit: a straight piece of 1e-13 a is one that is left out
+            # the widest fillet to the last bit: a straight of 1e-13 a is left out
             values[name] = high if part == 1.0 else value
         if self.stadium:
             values["r_over_a"] = values["b_over_a"]

@@ -78,7 +78,7 @@ class Processes:
         self.executor.shutdown()
 
     def stop(self) -> None:
-        """End them; none has anything on disk that could be torn."""
+        """End them; none has an unfinished file."""
         with interrupts_ignored():
             for process in set(multiprocessing.active_children()) - self._others:
                 process.terminate()
@@ -95,7 +95,7 @@ class Cluster:
     Raises
     ------
     ValueError
-        If Dask is not installed, or nobody answers at the address.
+        If Dask is not installed, or no scheduler answers at the address.
     """
 
     def __init__(self, address: str) -> None:
@@ -120,14 +120,14 @@ class Cluster:
         return max(1, sum(self._client.nthreads().values()))
 
     def restart(self) -> None:
-        """Nothing: the cluster mends itself."""
+        """Do nothing: the cluster replaces workers itself."""
 
     def close(self) -> None:
         """Leave."""
         self.stop()
 
     def stop(self) -> None:
-        """Take back what is not done, and leave."""
+        """Cancel what is not done, and leave."""
         self.executor.shutdown(wait=False)
         self._client.close()
 
@@ -175,7 +175,7 @@ def _start() -> None:
 
 
 def _leave_with_parent() -> None:
-    """A parent that is killed outright closes no queue, and its workers would wait for ever."""
+    """End with the parent: a killed one closes no queue, and workers would wait for ever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

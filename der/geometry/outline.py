@@ -112,7 +112,7 @@ class PiecewiseLinear:
         return self.knot_place[i] + chord
 
     def _locate(self, s: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return for each `s` its piece, the way into it and the curvature's slope there."""
+        """Return for each `s` its piece, the arc length into it and the curvature's slope there."""
         last = len(self.curvature_start) - 1
         i = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, last)
         rise = self.curvature_end[i] - self.curvature_start[i]

@@ -1,4 +1,4 @@
-"""The two sides of a curve: where labels are asked for, and which of its pieces bound something."""
+"""Curve pruning: labels on the two sides of a curve, and the parts of it that are boundaries."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CROWDED = 2e-4  # likewise: points nearer to each other than this have one pair 
 
 
 def asked_beside(line: Line) -> list[int]:
-    """Beside which points labels are asked for: no corners, and not all where they are crowded."""
+    """Points beside which labels are solved for: no corners, and not all crowded ones."""
     asked: list[int] = []
     last: Array | None = None
     for k, (at, corner) in enumerate(zip(line.points, line.corners, strict=True)):
@@ -72,14 +72,14 @@ def _away(line: Line, k: int, other: Line) -> float:
 
 
 def _own(places: Array, k: int, way: Array) -> float:
-    """How far from its k-th point a curve that turns back passes again, along a way."""
+    """How far from its k-th point a curve that turns back passes again, in a direction."""
     side = np.array([places[k], places[k] + way])
     again = [*meetings(side, places[: max(k - 1, 0)]), *meetings(side, places[k + 2 :])]
     return min((float(np.linalg.norm(m.place - places[k])) for m in again), default=math.inf)
 
 
 def pieces_of(line: Line, holds: Sequence[bool | None]) -> list[Line]:
-    """A curve's pieces that bound something, to the corners at their ends.
+    """The parts of a curve that are boundaries, up to the corners at their ends.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def joined(parts: Iterable[Boundaries]) -> Boundaries:
 
 
 class Slice(NamedTuple):
-    """A unit square of a family, and what a scan has found there."""
+    """A unit square of a family, and the scanned cases there."""
 
     family: Family
     sheet: str
@@ -93,7 +93,7 @@ class SliceCases:
         return self.family.case(self.sheet, unit)
 
     def bisected(self, crossings: list[Crossing], width: float) -> list[Crossing]:
-        """Two cases between each two, so close together, that differ likewise; in lockstep."""
+        """Closer pairs of cases that differ in the same way, all bisected at the same time."""
         while crossings and max(crossing.gap for crossing in crossings) > width:
             middles = [crossing.middle for crossing in crossings]
             rows = self.solve([self.case(middle) for middle in middles])
