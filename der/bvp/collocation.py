@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,11 +32,8 @@ class Direction(NamedTuple):
 
     def plus(self, share: float, other: Direction) -> Direction:
         """These unknowns and a share of others."""
-        return Direction(
-            self.frames + share * other.frames,
-            self.p + share * other.p,
-            self.gamma + share * other.gamma,
-        )
+        pairs: Iterable[tuple[Any, Any]] = zip(self, other, strict=True)
+        return Direction._make(a + share * b for a, b in pairs)
 
 
 class Solution(NamedTuple):
@@ -175,11 +173,8 @@ class Collocation:
         found = self.solved(fine, guess, along, iterations=1, tolerance=0.0)
         if isinstance(found, Failure):
             return Error(np.inf, np.inf, np.inf)
-        return Error(
-            abs(found.gamma - at.gamma),
-            abs(found.moment - at.moment),
-            abs(found.energy - at.energy),
-        )
+        changes = (getattr(found, name) - getattr(at, name) for name in Error._fields)
+        return Error(*map(abs, changes))
 
 
 def collocation(sector: Sector) -> Collocation:
