@@ -46,27 +46,19 @@ if TYPE_CHECKING:
     from der.rod.system import RodSystem
     from der.scene import Scene
 
-# type checkers want literal lists: the statement, the functions, the records, what can go wrong
-__all__ = ["Ring", "Scale", "Scene", "Section", "circle", "ellipse", "profile", "rectangle"]
-__all__ += ["Events", "Options", "RodSystem", "discrete_rod", "follow", "straight", "supported"]
-__all__ += ["__version__", "rectangular_section", "section", "triangle"]
-__all__ += ["barrier", "compare", "energy_surface", "fold", "landscape", "least_push"]
-__all__ += ["packing_ratio", "phase_diagram", "planar", "solve_bvp", "squeeze", "states"]
-__all__ += ["AtPi", "BarrierCurves", "Barriers", "ComparedPoint", "ComparedState", "Comparison"]
-__all__ += ["Instant", "Landscape", "LeastPush", "Mode", "Pass", "Path", "PhaseDiagram"]
-__all__ += [
-    "PlanarState",
-    "PlanarStates",
-    "Point",
-    "Push",
-    "Rest",
-    "RingState",
-    "Saddle",
-    "Shapes",
-    "Squeeze",
+# fmt: off
+__all__ = [
+    "AtPi", "BarrierCurves", "Barriers", "ComparedPoint", "ComparedState", "Comparison",
+    "Events", "Instant", "Interrupted", "Landscape", "LeastPush", "Mode", "NotConverged",
+    "Options", "Pass", "Path", "PhaseDiagram", "PlanarState", "PlanarStates", "Point", "Push",
+    "Reason", "Rest", "Ring", "RingState", "RodSystem", "Saddle", "Scale", "Scene", "Section",
+    "Shapes", "Squeeze", "SqueezePoint", "States", "Surface", "Timing", "Transition",
+    "__version__", "barrier", "circle", "compare", "discrete_rod", "ellipse", "energy_surface",
+    "fold", "follow", "landscape", "least_push", "packing_ratio", "phase_diagram", "planar",
+    "profile", "rectangle", "rectangular_section", "section", "solve_bvp", "squeeze", "states",
+    "straight", "supported", "triangle",
 ]
-__all__ += ["SqueezePoint", "States", "Surface", "Timing", "Transition"]
-__all__ += ["Interrupted", "NotConverged", "Reason"]
+# fmt: on
 
 _NAMES = {  # by the module where they live
     "der.analysis.compare": "compare",

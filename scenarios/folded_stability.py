@@ -21,12 +21,11 @@ import numpy as np
 
 import der
 from der.analysis.request import Request
-from der.kernels.assembly import assemble
 from der.problem import total_index
 from der.rod.equilibrium import Equilibrium
-from der.rod.gripped_ring import GrippedRing, free_supports, gripped_ring
+from der.rod.free_ring import balance
+from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.rod.rod import State
-from der.rod.system import RodSystem
 from scenarios.output import Arguments, write_table
 
 EDGES = 128
@@ -98,17 +97,14 @@ class Folded:
         """Index at fixed moment."""
         return self.index(h_over_t) + (self.slope(h_over_t) < 0.0)
 
-    def alone(self, h_over_t: float) -> tuple[RodSystem, State]:
+    def alone(self, h_over_t: float) -> tuple[der.RodSystem, State]:
         """The released ring, and the state with the forces that close it."""
         section = der.rectangular_section(h_over_t)
         own = gripped_ring(self.ring, section, self.n_edges)
         full = gripped_ring(self.ring, section, self.n_edges, name="full")
-        free = RodSystem(full.rod, free_supports(full.rod))
-        quat = own.full_frames(self.state)
-        force = _closing_force(free, quat)
-        start = State(quat, np.zeros(len(quat)), force, 0.0)
-        at = free.correct(start)
-        return free, at.state if at.converged else start
+        free = balance(full.rod, own.full_frames(self.state), np.zeros(self.n_edges))
+        at = free.unpinned.correct(free.state)
+        return free.unpinned, at.state if at.converged else free.state
 
     def index_free(self, h_over_t: float) -> int:
         """Index of the released ring."""
@@ -131,14 +127,6 @@ def _evenly_bent(ring: der.Ring, gripped: GrippedRing) -> State:
     # about E1 by the angle, then about E3 by -pi: (0, 0, 0, -1) o (cos a, sin a, 0, 0)
     quat = np.stack([0.0 * a, 0.0 * a, -np.sin(a), -np.cos(a)], axis=1)
     return gripped.start.but(quat=quat, load=math.pi)
-
-
-def _closing_force(ring: RodSystem, quat: np.ndarray) -> np.ndarray:
-    """The internal force of a closed ring at rest, from its frames, by least squares."""
-    system = assemble(ring.rod, ring.supports, quat, np.zeros(len(quat)), np.zeros(3), 0.0)
-    free = ring.supports.free.reshape(-1)
-    border = system.border.reshape(-1, 3)[free]
-    return -np.linalg.lstsq(border, system.grad.reshape(-1)[free], rcond=None)[0]
 
 
 def threshold(is_stable: Callable[[float], bool]) -> float | None:

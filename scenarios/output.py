@@ -7,24 +7,26 @@ import csv
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path as File
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
-import der
-from der.records.record import Record
+if TYPE_CHECKING:
+    import der
+    from der.records.record import Record
 
 
 class Arguments(argparse.ArgumentParser):
-    """The parser of a scenario: its docstring is the help; an error is one line and exit code 2.
+    """The parser of a module: its docstring is the help; an error is one line and exit code 2.
 
     Parameters
     ----------
-    file, text : the scenario's `__file__` and docstring.
+    file, text : the module's `__file__` and docstring.
     """
 
     def __init__(self, file: str, text: str | None) -> None:
-        self.name = File(file).stem
+        place = File(file).resolve().relative_to(File(__file__).resolve().parents[1])
+        self.name = place.stem
         super().__init__(
-            prog=f"python -m scenarios.{self.name}",
+            prog=f"python -m {'.'.join(place.with_suffix('').parts)}",
             description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,

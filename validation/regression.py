@@ -1,4 +1,4 @@
-"""Records of many rings by the code of one checkout, held against those by another.
+"""Records of many rings by the code of one checkout, compared with those by another.
 
     python -m validation.regression dump old --tree ../old    # before a change, by its own code
     python -m validation.regression dump new                  # after it, by this checkout
@@ -22,17 +22,13 @@ import subprocess
 import sys
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path as File
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.spatial import cKDTree
 
-Array = NDArray[np.float64]
 Cases = Iterator[tuple[str, Callable[[], Any]]]  # names, and what returns the record
 Maker = tuple[Any, ...]  # name of what makes the ring, and its arguments
 
@@ -97,15 +93,15 @@ def random(wanted: argparse.Namespace) -> Cases:
         kind, axis = str(draw.choice(["circle", "ellipse", "rectangle", "triangle"])), "xy"[k % 2]
         h, first, second = float(draw.uniform(1.0, 4.0)), *map(float, draw.uniform(size=2))
         b, apex = 0.2 + 0.8 * first, math.radians(30.0 + 90.0 * first)
-        ring: Maker = (kind, b, 0.1 + (b - 0.1) * second, axis)
-        if kind == "circle":
-            ring, h = CIRCLE, 0.2 * 300.0**first
-        elif kind == "ellipse":
-            ring = (kind, 0.5 + 0.5 * first, axis)
-        elif kind == "triangle":
-            inscribed = 0.5 * math.tan(math.pi / 4 - apex / 4)
-            ring = (kind, apex, 0.033 + (inscribed - 0.033) * second)
-        for name, make in both(ring, h, 64):
+        inscribed = 0.5 * math.tan(math.pi / 4 - apex / 4)
+        rings: dict[str, Maker] = {
+            "circle": CIRCLE,
+            "ellipse": (kind, 0.5 + 0.5 * first, axis),
+            "rectangle": (kind, b, 0.1 + (b - 0.1) * second, axis),
+            "triangle": (kind, apex, 0.033 + (inscribed - 0.033) * second),
+        }
+        h = 0.2 * 300.0**first if kind == "circle" else h
+        for name, make in both(rings[kind], h, 64):
             yield f"{k:03d}_{name}", make
 
 
@@ -232,10 +228,7 @@ LEAST = 1e-3  # in place of that value where it is smaller: such a column is all
 CONTACT = 1e-5  # likewise, where strands pass through each other: such points are bisected to that
 BARS = 0.1  # of an estimated error, where it changes by more than CLOSE
 CORNER = 1e-7  # of the sides of a diagram
-# A boundary is known to 1e-8, at worst 4e-6, but in points only, and these may shift along it. So
-# points are held against the splines through the others: those from cells twice as wide, other
-# points of the same curves, are at most 5e-6 off (figs. 3a, 5c, 8c).
-CURVE = 2e-5  # of the sides of a diagram
+CURVE = 2e-5  # likewise; see `validation.boundaries`
 STATES = {"gamma", "moment", "energy", "index", "index_moment", "x", "frames"}  # columns of a path
 STATES |= {"distance", "force", "force_error", "energy_error"}  # and of a squeezed ring
 NOT_JUDGED = {
@@ -349,16 +342,10 @@ def asked(record: dict[str, Any]) -> dict[str, Any]:
     return chosen(record) | inner
 
 
-# --- Diagrams --------------------------------------------------------------------------------
-
-PLACE = ("b_over_a", "r_over_a", "vertex_angle", "natural_curvature", "h_over_t")
-FINE = 32  # a chord is then 1/1024 as far off as that of an interval
-Row = Mapping[str, str]
-Lines = Mapping[str, list[Array]]  # points (n, 5) of curves, in units of the sides, by kind
-
-
 def judged_diagram(old: dict[str, Any], new: dict[str, Any]) -> Iterator[Found]:
     """What became of the labels, boundaries and corners of a diagram."""
+    from validation.boundaries import case_of, lines_of, off_lines, place_of
+
     sides = np.ptp([place_of(row) for row in old["cases"]], axis=0)
     sides[sides == 0.0] = 1.0
     before, after = ({case_of(row): row["label"] for row in d["cases"]} for d in (old, new))
@@ -366,63 +353,9 @@ def judged_diagram(old: dict[str, Any], new: dict[str, Any]) -> Iterator[Found]:
         yield judged_leaf(case, (was, "", False), (after.get(case), "", False), 1.0)
     for table, kind, allowed in (("boundaries", "curve", CURVE), ("corners", "corner", CORNER)):
         ours, theirs = (lines_of(diagram[table], sides) for diagram in (old, new))
-        yield from off_lines(ours, theirs, Found(kind, 0.0, allowed, "is none now"))
-        yield from off_lines(theirs, ours, Found(kind, 0.0, allowed, "was none"))
-
-
-def case_of(row: Row) -> str:
-    """What tells a case from the others."""
-    return " ".join(row[name] for name in ("shape", "twist_axis", *PLACE, "nu"))
-
-
-def place_of(row: Row) -> list[float]:
-    """Where a row is in the diagram; 0 for what its shape has not."""
-    return [float(row[name] or 0.0) for name in PLACE]
-
-
-def lines_of(rows: Sequence[Row], sides: Array) -> Lines:
-    """The curves of a table; corners are curves of one point."""
-    found: dict[tuple[str, str], list[list[float]]] = defaultdict(list)
-    for k, row in enumerate(rows):
-        kind = " ".join([row["boundary"], row.get("other", ""), row["twist_axis"]])
-        found[kind, row.get("curve", str(k))].append(place_of(row))
-    lines: dict[str, list[Array]] = defaultdict(list)
-    for (kind, _), points in found.items():
-        lines[kind].append(np.array(points) / sides)
-    return lines
-
-
-def off_lines(ours: Lines, theirs: Lines, none: Found) -> Iterator[Found]:
-    """How far points of curves are from the smooth curves of their kind."""
-    for kind, lines in ours.items():
-        points = np.concatenate(lines)
-        others = [spline(line) for line in theirs.get(kind, [])]
-        owner = np.repeat(np.arange(len(others)), [len(line) for line in others])
-        nearest = cKDTree(np.concatenate(others)).query(points)[1] if others else []
-        sizes = [off(point, others[owner[k]]) for point, k in zip(points, nearest, strict=False)]
-        for point, size in zip(points, sizes or [math.inf] * len(points), strict=True):
-            words = f"{kind} at {point.round(6).tolist()} of the sides {none.words}: {size:.1e} off"
-            yield none._replace(size=size, words=words)
-
-
-def spline(line: Array) -> Array:
-    """Polyline of `FINE` pieces an interval, close to the cubic spline through a curve's points."""
-    step = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    line = line[np.append(True, step > 0.0)]
-    along = np.append(0.0, np.cumsum(step[step > 0.0]))
-    if len(line) < 3:
-        return line
-    places = np.interp(np.arange(FINE * (len(line) - 1) + 1) / FINE, np.arange(len(line)), along)
-    points: Array = CubicSpline(along, line)(places)
-    return points
-
-
-def off(point: Array, line: Array) -> float:
-    """Least distance of a point from a polyline."""
-    step = np.diff(line, axis=0, append=line[-1:])
-    along = ((point - line) * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-300)
-    nearest = line + np.clip(along, 0.0, 1.0)[:, None] * step
-    return float(np.linalg.norm(nearest - point, axis=1).min())
+        for some, others, none in ((ours, theirs, "is none now"), (theirs, ours, "was none")):
+            for place, size in off_lines(some, others):
+                yield Found(kind, size, allowed, f"{place} {none}: {size:.1e} off")
 
 
 # --- The command -----------------------------------------------------------------------------

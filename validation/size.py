@@ -23,7 +23,7 @@ from pathlib import Path as File
 from pstats import Stats
 from typing import Any, NamedTuple
 
-from validation.arguments import Arguments
+from scenarios.output import Arguments
 
 FOLDERS = ("der", "validation", "scenarios", "tests")
 LONG, WORST = 40, 10  # lines, above which a function is long; long functions that are named

@@ -1,9 +1,10 @@
-"""Solutions of a sector's boundary-value problem: solved for, moved between meshes, judged."""
+"""Solutions of a sector's boundary-value problem: solver, change of mesh, error estimate."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,7 @@ REASONS = {
     SLOW: Reason.TOO_MANY_ITERATIONS,
     SINGULAR: Reason.SINGULAR,
 }
-CLOSE = 1e-9  # last increment; rates and places are those before it
+CLOSE = 1e-9  # last increment; rates and positions are those before it
 
 
 class Direction(NamedTuple):
@@ -31,11 +32,8 @@ class Direction(NamedTuple):
 
     def plus(self, share: float, other: Direction) -> Direction:
         """These unknowns and a share of others."""
-        return Direction(
-            self.frames + share * other.frames,
-            self.p + share * other.p,
-            self.gamma + share * other.gamma,
-        )
+        pairs: Iterable[tuple[Any, Any]] = zip(self, other, strict=True)
+        return Direction._make(a + share * b for a, b in pairs)
 
 
 class Solution(NamedTuple):
@@ -49,7 +47,7 @@ class Solution(NamedTuple):
     energy: float  # U of the full ring, GJ/a
     tangent: Direction
     moment_rate: float  # dM along the tangent
-    orientation: int  # sign of the determinant, the same all along a path
+    orientation: int  # sign of the determinant, constant along a path
     nodes: Array  # (n + 1, 4) frames and
     places: Array  # (n + 1, 3) positions less the first, at the mesh points
     iterations: int
@@ -101,7 +99,7 @@ def required(found: Solution | Failure, message: str) -> Solution:
 
 
 class Error(NamedTuple):
-    """What a solution changes by on a mesh of half the intervals' length."""
+    """The change of a solution on a mesh with halved intervals."""
 
     gamma: float
     moment: float
@@ -137,19 +135,10 @@ class Collocation:
         )
         if status != CONVERGED and not (status == SLOW and tolerance == 0.0):
             return Failure(REASONS[status], done)
+        energy *= self.sector.copies
+        rates = Direction(tangent, tangent_p, tangent_gamma)
         return Solution(
-            mesh,
-            frames,
-            p,
-            gamma,
-            moment,
-            self.sector.copies * energy,
-            Direction(tangent, tangent_p, tangent_gamma),
-            rate,
-            orientation,
-            nodes,
-            places,
-            done,
+            mesh, frames, p, gamma, moment, energy, rates, rate, orientation, nodes, places, done
         )
 
     def flat(self, n: int) -> Solution | Failure:
@@ -184,11 +173,8 @@ class Collocation:
         found = self.solved(fine, guess, along, iterations=1, tolerance=0.0)
         if isinstance(found, Failure):
             return Error(np.inf, np.inf, np.inf)
-        return Error(
-            abs(found.gamma - at.gamma),
-            abs(found.moment - at.moment),
-            abs(found.energy - at.energy),
-        )
+        changes = (getattr(found, name) - getattr(at, name) for name in Error._fields)
+        return Error(*map(abs, changes))
 
 
 def collocation(sector: Sector) -> Collocation:

@@ -1,8 +1,8 @@
-"""One interval after the other, condensed: what a corrector's Newton iteration is made of.
+"""The terms of one Newton iteration: intervals are condensed one after the other.
 
-An interval gives one dense system of 4 m unknowns, whose right-hand sides are the variations of its
-left end, of p and of gamma, and the residual; what is carried on are those at its right end. See
-`corrector`.
+An interval gives one dense system of 4 m unknowns. Its right-hand sides are the variations of its
+left end, of p and of gamma, and the residual. The next interval starts from the variations at its
+right end. See `corrector`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Piece(NamedTuple):
 
 
 class Inner(NamedTuple):
-    """Workspace: what an interval's equations are made of, at its m stages.
+    """Workspace: the terms of an interval's equations at its m stages.
 
     The numbers q of all stages stand in one row of 4 m, along which the longest loops run.
     """
@@ -67,9 +67,9 @@ def workspace(m):
 def eliminate(w):
     """Solve in place: (n + c, n) columns of [matrix | right-hand sides]; the determinant's sign.
 
-    0 where a pivot vanishes. Solutions replace the right-hand sides, multipliers the matrix. Gauss
-    and Jordan's elimination takes more products than Gauss's, but all its loops run over n numbers
-    next to each other.
+    0 where a pivot vanishes. Solutions replace the right-hand sides, multipliers the matrix.
+    Gauss-Jordan elimination takes more products than Gaussian elimination, but its loops run over n
+    neighbouring numbers.
     """
     n = w.shape[1]
     sign = 1
@@ -154,7 +154,7 @@ def moment_at(m0, force, at, out):
 
 @njit(cache=True)
 def _right_hand_sides(piece, rest, m0, force, frames, inner, moment, turn):
-    """Fill ``inner`` but for positions and directors, which it has."""
+    """Fill ``inner``, except for positions and directors, which are known."""
     for j in range(frames.shape[0]):
         at, fm = inner.at[j], inner.fm[j]
         moment_at(m0, force, at, moment)

@@ -26,17 +26,17 @@ SHARPEST = 0.6  # rad, a step that turns more is repeated shorter
 STRAIGHT = 0.01  # bulge of a step that is believed although its ends are oriented unequally
 EASY = 4  # Newton iterations; a step that takes more is followed by a shorter one
 MOST_STEPS = 2000
-MOST_WORK = 200_000  # intervals of all steps together: a ring that winds up needs ever more of them
+MOST_WORK = 200_000  # intervals of all steps together: a ring that winds up needs more and more
 FEWEST_INTERVALS, MOST_INTERVALS = 3, 4000
 REFIT = 16  # steps after which the mesh is fitted again, unless its error asks for it before
-IN_VAIN = 4.0  # times the intervals, which at order 8 leave 2e-5 of an error: where they leave
-REMAINS = 0.5  # half of it or more, what is left is rounding
+# Four times the intervals leave 2e-5 of an error of order 8. If half of it remains, it is rounding.
+MORE, REMAINS = 4.0, 0.5
 SAFETY = 0.25  # of the tolerance: the error aimed at
 NEGLIGIBLE = 1e-3  # of the tolerance: square of a step's last increment, about the error left
 
 
 class Scales:
-    """The largest |M| and U handed out so far, at least those of a first small turn."""
+    """The largest |M| and U so far, at least those of a first small turn."""
 
     def __init__(self, start: Solution, turn: float = FIRST_TURN) -> None:
         self.moment = turn * abs(start.slope)
@@ -45,8 +45,8 @@ class Scales:
     def largest(self, points: Sequence[Point]) -> float:
         """The largest error of points not yet handed out, relative.
 
-        What is not handed out is not in the record, and no measure of what is: a solution on too
-        coarse a mesh may have any energy, and one beyond the end a larger than all before it.
+        Points that are not handed out are not in the record, and do not set its scale: a solution
+        on too coarse a mesh may have any energy, and one beyond the end may have the largest.
         """
         moment, energy = self._with(points)
         return max(
@@ -66,7 +66,7 @@ class Scales:
 def follow(system: Collocation, wanted: Wanted, statistics: Statistics) -> Iterator[Point]:
     """Hand out the points of the path from the flat ring on, events in their places.
 
-    ``statistics`` are counted up on the way.
+    ``statistics`` are counted up.
 
     Raises
     ------
@@ -86,7 +86,7 @@ class _Refinement:
         self.system = system
         self.tolerance = tolerance
         self.most = max(MOST_INTERVALS, 4 * len(system.sector.joints))
-        self._first: tuple[int, float] | None = None  # intervals and error that did not do
+        self._first: tuple[int, float] | None = None  # intervals and error of the first bad mesh
 
     def flat(self, statistics: Statistics) -> tuple[Point, int]:
         """The flat ring on a mesh fine enough, and about how many intervals that has."""
@@ -107,7 +107,7 @@ class _Refinement:
         self._first = None
 
     def check(self, n: int, size: float, gamma: float) -> None:
-        """Give up where more intervals are of no use, after an error that n intervals leave.
+        """Stop where more intervals do not help, after the error that n intervals leave.
 
         Raises
         ------
@@ -117,7 +117,7 @@ class _Refinement:
         if self._first is None or not math.isfinite(self._first[1]):
             self._first = n, size
         fewest, largest = self._first
-        if n >= IN_VAIN * fewest and size > REMAINS * largest:
+        if n >= MORE * fewest and size > REMAINS * largest:
             raise ContinuationFailed(
                 f"rounding leaves an error of {size:.2g} on {n} intervals, as on fewer,"
                 f" at gamma = {gamma:.6f}",
@@ -139,7 +139,7 @@ class _Refinement:
 
 @dataclass
 class _Path:
-    """A path on its way, and what the next step needs."""
+    """A path being followed, and what its next step needs."""
 
     system: Collocation
     wanted: Wanted
@@ -150,7 +150,7 @@ class _Path:
 
     def __post_init__(self) -> None:
         self.here = self.start.solution
-        # a stiff ring's moment is largest long before FIRST_TURN
+        # the moment of a stiff ring is largest long before FIRST_TURN
         self.scales = Scales(self.here, LEAST_TURN)
         self.last: Step | None = None  # on the present mesh
         self.length, self.age = FIRST_STEP, 0
@@ -187,18 +187,18 @@ class _Path:
             try:
                 points, ended = located(self.wanted, step, end)
             except ContinuationFailed:
-                # both ends are solutions, but not of one smooth curve: look again from closer
+                # both ends are solutions, but not of one smooth curve: repeat with a shorter step
                 if step.length < 4.0 * SMALLEST_STEP:
                     raise
                 self.length = 0.25 * step.length
                 return None
-            # of a path that ends in its first step, errors are relative to what that step takes
+            # where a path ends in its first step, errors are relative to that step's values
             size = self.scales.largest(points if self.statistics.steps else [*points, end])
         if size <= tolerance:
             return points, ended, size
         n = len(self.here.mesh.h)
         self.refinement.check(n, size, self.here.gamma)
-        # at least one more than asked for last: a mesh rounds to what its joints allow
+        # at least one more than asked for last: joints may round the number down
         more = max(self.intervals + 1, self.refinement.refined(n, size))
         self._refit(step.end, min(more, self.refinement.most))
         self.length = step.length
@@ -216,7 +216,7 @@ class _Path:
             self._refit(self.here, self.refinement.refined(len(self.here.mesh.h), size))
 
     def _refit(self, fit: Solution, n: int) -> None:
-        """Go on from the same solution on a mesh of about ``n`` intervals fitted to ``fit``."""
+        """Continue from the same solution on a mesh of about ``n`` intervals fitted to ``fit``."""
         mesh = fitted(fit.mesh, fit.nodes[:-1], fit.frames, n)
         found = self.system.on(mesh, self.here)
         self.statistics.newton_iterations += found.iterations

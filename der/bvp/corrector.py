@@ -1,11 +1,11 @@
 r"""Newton's method for the collocation equations on one sector, and the tangent of the path.
 
-Unknown are the frames at the stages, the constants p of the rod (below) and gamma; frames at the
-mesh points and all positions are explicit in them. Each interval gives, with the variations of its
-left end, of p and of gamma as right-hand sides, one dense system of 4 m unknowns, solved with
-partial pivoting and at once (condensation); what is carried on to the next interval are the
-variations at its right end. A small system remains for p and gamma: the conditions at the far end
-and one more, for the step:
+The unknowns are the frames at the stages, the constants p of the rod (below) and gamma. Frames at
+the mesh points and all positions follow from them. Each interval gives one dense system of 4 m
+unknowns, with the variations of its left end, of p and of gamma as right-hand sides. It is solved
+at once with partial pivoting (condensation), and the variations at its right end enter the next
+interval. A small system remains for p and gamma: the conditions at the far end and one more, for
+the step:
 
     interval i    G_i dQ_i = dq_i + (terms in dp) - residual,    dq_{i+1} = linear in dq_i, dQ_i
     end           3 rotations (vector part of target^-1 o q: regular at all gamma), 1 or 2 positions
@@ -31,7 +31,7 @@ from der.bvp.condensing import (
 )
 
 CONVERGED, DIVERGED, SLOW, SINGULAR = 0, 1, 2, 3
-LARGEST = 2.0  # a Newton increment of a frame above this leads nowhere
+LARGEST = 2.0  # Newton's method has diverged if a frame's increment is larger
 
 
 @njit(cache=True)
@@ -133,7 +133,7 @@ def correct(
 
     Parameters
     ----------
-    quarter, stiffness, start, end, loads : a `Piece`, whose parts are quicker to hand over.
+    quarter, stiffness, start, end, loads : the parts of a `Piece`, passed faster one by one.
     h : (n,) lengths of the intervals; rest : (n, m) k1u at the stages.
     frames : (n, m, 4), p : (n_p,), gamma : the guess; frames and p are overwritten.
     along : (n, m, 4), along_gamma : the tangent to which the step is orthogonal, and that orients
@@ -152,7 +152,7 @@ def correct(
     gamma : of the result.
     tangent_gamma : see above.
     rate : dM along the tangent, M the moment of one arm.
-    orientation : sign of the determinant of the whole system, tangent row included.
+    orientation : sign of the determinant of the complete system, tangent row included.
     moment, energy : M and the sector's U.
     """
     piece = Piece(quarter, stiffness, start, end, loads)

@@ -40,7 +40,7 @@ from der.geometry.ring import Ring
 TURN = 1.8  # rad, of a panel to begin with
 RESOLVED = 1e-12  # last Legendre coefficients of exp(i phi), of modulus 1, on a panel
 DEEPEST = 60  # halvings of a panel
-IMPERFECTION = 1.0  # rad, on the way from the circle to the ring
+IMPERFECTION = 1.0  # rad, of the homotopy from the circle to the ring
 
 
 class NotFolded(RuntimeError):
@@ -143,20 +143,20 @@ def bent_by_force(ring: Ring) -> Half:
 
     Notes
     -----
-    Solutions are followed from the circle, phi = 6 pi s/L with f = 0, by morphing its natural angle
-    into the ring's. Triangles with small fillets have several: the threefold symmetry of the
-    equilateral one makes its branch bifurcate, and neighbouring triangles keep the parts. So the
-    way is gone twice, with either sign of an imperfection that vanishes at its end, and the
-    solution with the smaller integral of k_d^2 is kept. Other starts found no smaller one on 188
-    triangles over the range of the paper's figure 9; two triangles that were twisted, of 60 and 90
-    degrees, end in these shapes. It is the least among mirror-symmetric shapes only.
+    Solutions are followed from the circle, phi = 6 pi s/L with f = 0, by a homotopy of its natural
+    angle to the ring's. Triangles with small fillets have several solutions: the threefold symmetry
+    of the equilateral one makes its branch bifurcate, and neighbouring triangles keep the parts. So
+    the homotopy is followed twice, with an imperfection of either sign that vanishes at its end,
+    and the solution with the smaller integral of k_d^2 is kept. Other initial guesses found no
+    smaller one on 188 triangles over the range of the paper's figure 9. Two triangles that were
+    twisted, of 60 and 90 degrees, end in these shapes. Only mirror-symmetric shapes are compared.
     """
     turning = float(ring.natural_angle(ring.length / 2))
 
     def solve(panels: Panels) -> Half:
         rest = ring.natural_angle(panels.nodes)
-        ways = [followed(panels, rest, turning, size) for size in (IMPERFECTION, -IMPERFECTION)]
-        found = [Half(ring, panels, way.phi, rest, way.k, way.f) for way in ways if way is not None]
+        ends = [followed(panels, rest, turning, size) for size in (IMPERFECTION, -IMPERFECTION)]
+        found = [Half(ring, panels, end.phi, rest, end.k, end.f) for end in ends if end is not None]
         if not found:
             raise NotFolded(f"{ring!r}: no planar three-covered shape was found")
         return min(found, key=lambda half: float(panels.integral(half.bending_at_nodes**2)))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from der.bvp.collocation import Collocation, Solution
 from der.bvp.gauss import Array, interpolation
+from der.bvp.meshes import moved_to
 from der.geometry.mesh import sites
 
 Flags = NDArray[np.bool_]
@@ -50,7 +51,7 @@ def _folded(system: Collocation, s: Array) -> tuple[Array, Flags, Flags]:
 def _places(system: Collocation, at: Solution, s: Array) -> Array:
     """Positions (k, 3)."""
     inside, near, arm = _folded(system, s)
-    i, weights = _local(system, at, inside, integral=True)
+    i, weights = _integrals(system, at, inside)
     d3 = np.einsum("ij,ijk->ik", weights, _directors(at.frames)[i, :, 2])
     x = at.places[i] + at.mesh.h[i, None] * d3
     end = at.places[-1]
@@ -63,22 +64,18 @@ def _places(system: Collocation, at: Solution, s: Array) -> Array:
 def _frames(system: Collocation, at: Solution, s: Array) -> Array:
     """Directors (k, 3, 3)."""
     inside, near, arm = _folded(system, s)
-    i, weights = _local(system, at, inside, integral=False)
-    values = np.concatenate([at.nodes[:-1, None], at.frames], axis=1)
-    q = np.einsum("ij,ijk->ik", weights, values[i])
+    q = moved_to(at.mesh, at.nodes[:-1], at.frames, inside)
     d = _directors(q / np.linalg.norm(q, axis=1, keepdims=True))
     d[near] *= REVERSED[:, None] * ABOUT_E2
     d[arm] *= REVERSED[:, None] * ABOUT_E3
     return d
 
 
-def _local(system: Collocation, at: Solution, s: Array, *, integral: bool) -> tuple[Places, Array]:
-    """Interval of each arc length, and weights of its stages (or of its left end and stages)."""
+def _integrals(system: Collocation, at: Solution, s: Array) -> tuple[Places, Array]:
+    """Interval of each arc length, and weights of its stages for the integral from its left end."""
     nodes, points = at.mesh.nodes, system.rule.points
     i: Places = np.clip(np.searchsorted(nodes, s, side="right") - 1, 0, len(nodes) - 2)
     u = (s - nodes[i]) / at.mesh.h[i]
-    if not integral:
-        return i, interpolation(np.append(0.0, points), u)
     # integrals from 0 to u of the stages' polynomials, by the rule itself on [0, u]
     inner = interpolation(points, (u[:, None] * points).ravel()).reshape(*u.shape, -1, len(points))
     weights: Array = u[:, None] * np.einsum("j,ujk->uk", system.rule.weights, inner)

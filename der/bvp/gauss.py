@@ -2,7 +2,7 @@
 
 Stages at the m Gauss points of [0, 1]; the collocation polynomial has degree m, the values at the
 ends of intervals are accurate to h^(2m) (de Boor & Swartz 1973; Ascher, Mattheij & Russell 1995,
-section 5.4). All is exact to rounding: computed from Legendre polynomials, not tabulated.
+section 5.4). The tables are exact to rounding: computed from Legendre polynomials.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Rule(NamedTuple):
     last: Array  # (m,) b A^-1: the right end from the stages
     first: float  # and from the left end, 1 - sum(last)
     halves: Array  # (2 m, m + 1) left end and stages -> stages of the two halves
-    halves_inner: Array  # (2 m, m) the same from the stages alone, one order less
+    halves_inner: Array  # (2 m, m) the same from the stages only, one order less
     top: Array  # (m + 1,) left end and stages -> m-th derivative of the polynomial
 
 
@@ -43,19 +43,11 @@ def rule(stages: int = STAGES) -> Rule:
     partial = np.asarray(np.linalg.solve(powers.T, rows.T).T, dtype=np.float64)
     slope = np.asarray(np.linalg.inv(partial), dtype=np.float64)
     last = weights @ slope
+    first = 1.0 - float(last.sum())
     places = np.append(0.5 * points, 0.5 + 0.5 * points)
-    return Rule(
-        points,
-        weights,
-        partial,
-        slope,
-        slope.sum(axis=1),
-        last,
-        1.0 - float(last.sum()),
-        interpolation(np.append(0.0, points), places),
-        interpolation(points, places),
-        top_derivative(points),
-    )
+    halves = interpolation(np.append(0.0, points), places), interpolation(points, places)
+    sums, top = slope.sum(axis=1), top_derivative(points)
+    return Rule(points, weights, partial, slope, sums, last, first, *halves, top)
 
 
 def interpolation(sites: Array, places: Array) -> Array:

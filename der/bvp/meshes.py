@@ -69,10 +69,10 @@ def fitted(mesh: Mesh, ends: Array, frames: Array, n: int) -> Mesh:
     jump[joints] = 0.0  # the natural curvature jumps, which is no error
     at_left, at_right = np.append(0.0, jump), np.append(jump, 0.0)
     density = np.maximum(at_left, at_right) ** (1.0 / (len(rule.points) + 1))
-    alone = (at_left == 0.0) & (at_right == 0.0)  # one interval between two joints
-    if alone.any():
-        scale = np.linalg.norm(top[alone], axis=1) / mesh.h[alone]
-        density[alone] = scale ** (1.0 / (len(rule.points) + 1))
+    single = (at_left == 0.0) & (at_right == 0.0)  # one interval between two joints
+    if single.any():
+        scale = np.linalg.norm(top[single], axis=1) / mesh.h[single]
+        density[single] = scale ** (1.0 / (len(rule.points) + 1))
     mean = float(np.sum(density * mesh.h)) / sector.length
     if not mean > 0.0:
         density = np.ones_like(density)
@@ -82,7 +82,7 @@ def fitted(mesh: Mesh, ends: Array, frames: Array, n: int) -> Mesh:
 
 
 def distributed(sector: Sector, s: Array, density: Array, n: int) -> Array:
-    """Mesh points that share a density equally, piecewise constant between the sites ``s``."""
+    """Mesh points that share a density equally, piecewise constant between ``s``."""
     shares = np.append(0.0, np.cumsum(density * np.diff(s)))
     at_joints = np.interp(sector.joints, s, shares)
     each = shares[-1] / n

@@ -17,7 +17,7 @@ from der.geometry.ring import Ring
 Array = NDArray[np.float64]
 
 POINTS = 3600  # on the ring; a multiple of 12, so that the strands of a circle have equal vertices
-LARGEST_TURN = 2.0  # rad, of an edge that stands for an arc; sharper corners are cut short
+LARGEST_TURN = 2.0  # rad, of an edge in place of an arc; sharper corners are cut short
 GRID = 1e-13  # of the extent: coordinates are rounded to it, so that such strands are one
 
 
@@ -52,7 +52,7 @@ def envelope_area(shape: Folded) -> float:
 
     Notes
     -----
-    Every edge of the polygon that stands for the centreline has, on average, the curve's area under
+    Every edge of the polygon in place of the centreline has, on average, the curve's area under
     it (`equal_area_vertices`). What is left is of third order in the edge: the parts of edges
     beside a crossing, and jumps of the curvature.
     """

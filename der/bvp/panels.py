@@ -31,19 +31,22 @@ class Panels(NamedTuple):
 
     def running_integral(self, values: Array) -> Array:
         """Return the integral from 0 up to every node; both are (..., p, NODES)."""
-        within = self.length[:, None] * (values @ _ONCE.T)
-        whole = within[..., -1]
-        return within[..., :-1] + (np.cumsum(whole, axis=-1) - whole)[..., None]
+        return _running(self.length[:, None] * (values @ _ONCE.T))
 
     def double_integral(self, values: Array) -> Array:
         """Return the running integral of the running integral."""
-        whole = self.length * (values @ _ONCE[-1])
-        entry = np.cumsum(whole, axis=-1) - whole  # of the inner one, at a panel's first end
+        total = self.length * (values @ _ONCE[-1])
+        entry = np.cumsum(total, axis=-1) - total  # of the inner one, at a panel's first end
         within = self.length[:, None] * (
             self.length[:, None] * (values @ _TWICE.T) + entry[..., None] * _NODE_AND_END
         )
-        whole = within[..., -1]
-        return within[..., :-1] + (np.cumsum(whole, axis=-1) - whole)[..., None]
+        return _running(within)
+
+
+def _running(within: Array) -> Array:
+    """Integrals up to every node, of those from the start of each panel up to nodes and end."""
+    total = within[..., -1]
+    return within[..., :-1] + (np.cumsum(total, axis=-1) - total)[..., None]
 
 
 def _rules() -> tuple[Array, Array, Array, Array]:

@@ -13,9 +13,9 @@ from der.bvp.gauss import Array
 from der.bvp.panels import Panels
 
 FOLDED_TURN = 6 * np.pi  # of the three-covered ring
-# Shares of the way done in one step; steps of 0.5 were seen to miss branches of least energy.
+# Steps of the homotopy; steps of 0.5 have missed branches of least energy.
 FIRST_STEP, SMALLEST_STEP = 0.2, 0.01
-CONVERGED, ON_THE_WAY = 1e-12, 1e-3  # rad, Newton's last change of angle
+CONVERGED, BETWEEN = 1e-12, 1e-3  # rad, Newton's last change of angle
 LARGEST_CHANGE = 3.0  # rad, of a Newton step that is still believed
 INEXACT = 1e-5  # relative, of a Newton step: what is left of the error, for the next one
 SWEEPS, ITERATIONS = 100, 8
@@ -36,9 +36,9 @@ class Planar(NamedTuple):
 
 
 def followed(panels: Panels, rest: Array, turning: float, imperfection: float) -> Planar | None:
-    """Return the solution at the end of the way from the circle to the ring, None if it is lost.
+    """Return the solution at the end of the homotopy from circle to ring, None if it is lost.
 
-    On the way, 0 <= w <= 1, the natural angle is (1 - w) (that of the circle + imperfection) + w
+    For 0 <= w <= 1 the natural angle is (1 - w) (that of the circle + imperfection) + w
     rest. The imperfection, of one wave on the ring, makes the loop at one grip tighter.
     """
     s, length = panels.nodes, panels.knots[-1]
@@ -47,16 +47,16 @@ def followed(panels: Panels, rest: Array, turning: float, imperfection: float) -
     circle = turning * s / length + bump
     now = Planar(circle + uniform * s, uniform, 0.0)
     slope = Planar(0 * s, 0.0, 0.0)
-    way, step = 0.0, FIRST_STEP
-    while way < 1:
-        ahead = min(way + step, 1.0)
+    w, step = 0.0, FIRST_STEP
+    while w < 1:
+        ahead = min(w + step, 1.0)
         mixed = circle + ahead * (rest - circle)
-        accuracy = CONVERGED if ahead == 1 else ON_THE_WAY
-        found = _newton(panels, mixed, turning, now.plus(ahead - way, slope), accuracy)
+        accuracy = CONVERGED if ahead == 1 else BETWEEN
+        found = _newton(panels, mixed, turning, now.plus(ahead - w, slope), accuracy)
         if found is not None:
             slope = found.plus(-1, now)
-            slope = slope.plus(1 / (ahead - way) - 1, slope)
-            way, now = ahead, found
+            slope = slope.plus(1 / (ahead - w) - 1, slope)
+            w, now = ahead, found
         elif step < SMALLEST_STEP:
             return None
         else:

@@ -1,8 +1,8 @@
-"""A ring as a boundary-value problem on its smallest symmetric piece.
+"""A ring as a boundary-value problem on its smallest symmetry sector.
 
 A quarter (two mirror lines, D2) runs from the free point at +E2 to the grip at +E3, with (A.17) to
 (A.20) at its ends; a half (one mirror line, C2) from the grip at -E3 to that at +E3, with BC-III
-and BC-II. In both, arc length s counts from the piece's start.
+and BC-II. In both, arc length s counts from the sector's start.
 
     quarter   start: turned about E2 by the unknown phi; m . d2 = 0, F . E2 = 0
               end:   turned about E3 by -gamma; r1 = 0, F . E3 = 0 (it slides)
@@ -37,13 +37,13 @@ HALF[[0, 1, 2, 3, 4], [0, 1, 2, 3, 4]] = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Sector:
-    """The piece of a ring that is solved, and its section."""
+    """The symmetry sector of a ring that is solved, and its section."""
 
     ring: Ring
-    begin: float  # arc length of the ring at the piece's start, a
-    length: float  # of the piece, a
+    begin: float  # arc length of the ring at the sector's start, a
+    length: float  # of the sector, a
     joints: tuple[float, ...]  # where the natural curvature is not smooth, from 0 to length
-    piece: Piece  # what the kernels know
+    piece: Piece  # the same for the kernels
 
     @property
     def copies(self) -> int:
@@ -56,9 +56,7 @@ class Sector:
 
     def flat(self, s: Array) -> Array:
         """Frames of the flat ring, (..., 4)."""
-        half = 0.5 * (self.ring.angle(self.begin + s) - 0.5 * np.pi)
-        zero = np.zeros_like(half)
-        return np.stack([np.cos(half), np.sin(half), zero, zero], axis=-1)
+        return _flat(self.ring, self.begin + s)
 
     def flat_constants(self) -> Array:
         """Constants p of the flat ring: the moment that closes it, if it was bent to be closed."""
@@ -67,6 +65,13 @@ class Sector:
         if ratio != 1.0:  # a circle, of curvature 1
             p[1 if self.piece.quarter else 0] = self.piece.stiffness[0] * (1.0 - ratio)
         return p
+
+
+def _flat(ring: Ring, s: Array) -> Array:
+    """Frames (..., 4) of the flat ring at arc lengths of its own."""
+    half = 0.5 * (ring.angle(s) - 0.5 * np.pi)
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), np.sin(half), zero, zero], axis=-1)
 
 
 def sector(scene: Scene) -> Sector:
@@ -87,12 +92,9 @@ def sector(scene: Scene) -> Sector:
     length = 0.5 * ring.length - begin
     margin = CLOSE * ring.length
     inside = [s - begin for s in ring.kinks if begin + margin < s < begin + length - margin]
-    # a straight that rounding leaves between two fillets is none
+    # rounding may leave a straight between two fillets: it is left out
     inside = [a for a, b in pairwise([*inside, length]) if b - a > margin]
-    ends = np.array([begin, begin + length])
-    half = 0.5 * (ring.angle(ends) - 0.5 * np.pi)
-    zero = np.zeros(2)
-    start, end = np.stack([np.cos(half), np.sin(half), zero, zero], axis=-1)
+    start, end = _flat(ring, np.array([begin, begin + length]))
     section = scene.section
     stiffness = np.array([section.alpha, section.beta, 1.0])
     piece = Piece(quarter, stiffness, start, end, QUARTER if quarter else HALF)

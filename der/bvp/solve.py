@@ -49,7 +49,7 @@ def solve_bvp(
     Raises
     ------
     ValueError
-        For a tolerance that is not allowed, or a scene that asks for what this solver has not:
+        For a tolerance that is not allowed, or a scene that asks for what this solver cannot do:
         stretch, control of anything but arc length, dynamic relaxation, the full ring.
     NotConverged
         Where the path cannot be followed to its end; has the path so far.

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from der import problem
 from der.bvp.collocation import Collocation, Direction, Solution, required
 from der.bvp.gauss import Array
 from der.bvp.meshes import Mesh
@@ -23,11 +25,9 @@ NEAR = 0.1  # of a step: solutions at a given gamma that lie farther from the cu
 
 
 @dataclass
-class Statistics:
+class Statistics(problem.Statistics):
     """What a solve has cost so far."""
 
-    newton_iterations: int = 0
-    steps: int = 0
     intervals: int = 0  # of all steps, those to be repeated included
 
 
@@ -40,15 +40,21 @@ class Step:
     end: Solution
     length: float
     statistics: Statistics
-    jump: Direction = field(init=False)
-    cosine: float = field(init=False)  # of the angle between the tangents at both ends
-    _found: dict[float, Solution] = field(init=False)  # by s
 
-    def __post_init__(self) -> None:
-        a, b = self.start, self.end
-        object.__setattr__(self, "jump", b.unknowns.plus(-1.0, a.unknowns))
-        object.__setattr__(self, "cosine", dot(a.mesh, a.tangent, b.tangent))
-        object.__setattr__(self, "_found", {0.0: a, self.length: b})
+    @cached_property
+    def jump(self) -> Direction:
+        """The change of the unknowns from the start to the end."""
+        return self.end.unknowns.plus(-1.0, self.start.unknowns)
+
+    @cached_property
+    def cosine(self) -> float:
+        """Cosine of the angle between the tangents at both ends."""
+        return dot(self.start.mesh, self.start.tangent, self.end.tangent)
+
+    @cached_property
+    def _found(self) -> dict[float, Solution]:
+        """The solutions that are known, by s."""
+        return {0.0: self.start, self.length: self.end}
 
     def _weights(self, s: float) -> tuple[float, float, float]:
         """Weights of the tangent at the start, the jump and the tangent at the end in the cubic."""
@@ -82,7 +88,7 @@ class Step:
 
     @property
     def bulge(self) -> float:
-        """How far the end lies beside the tangent at the start, over the length."""
+        """Distance of the end from the tangent at the start, over the length."""
         square = dot(self.start.mesh, self.jump, self.jump)
         return float(max(square / self.length**2 - 1.0, 0.0) ** 0.5)
 
@@ -109,7 +115,7 @@ class Step:
             if found is not None and self._near(found, guess):
                 s = along(self.start, found.unknowns)
                 return s, self._found.setdefault(s, found)
-        # close to a fold gamma is a bad coordinate, s is not
+        # close to a fold gamma is a bad coordinate, but s is a good one
         ends = (low, self.at(low)), (high, self.at(high))
         s, found = self.change(lambda at: at.gamma - gamma, *ends)
         return s, found._replace(gamma=gamma)
@@ -130,7 +136,7 @@ class Step:
         return s, self.at(s)
 
     def _near(self, found: Solution, there: Direction) -> bool:
-        """Whether a solution found at given gamma lies where the cubic expects it."""
+        """Whether a solution found at given gamma is near the one that the cubic predicts."""
         away = found.unknowns.plus(-1.0, there)._replace(gamma=0.0)
         return dot(self.start.mesh, away, away) < (NEAR * self.length) ** 2
 
@@ -142,7 +148,7 @@ class Step:
     def beyond(self, length: float) -> Direction:
         """Unknowns at a distance beyond the end, measured along the tangent there."""
         guess = self.expected(self.length + length * self.cosine)
-        # of the distance, which the cubic does not know
+        # the cubic does not know the distance along the tangent
         return guess.plus(length - along(self.end, guess), self.end.tangent)
 
 

@@ -78,11 +78,7 @@ def over_gamma(scene: Scene) -> Bar:
 
 def counted(what: str, most: int) -> Bar:
     """A bar over things found."""
-    return lambda found, _: {
-        "completed": found,
-        "total": most,
-        "description": f"{found} {what}",
-    }
+    return lambda found, _: {"completed": found, "total": most, "description": f"{found} {what}"}
 
 
 @contextmanager

@@ -6,9 +6,9 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from typing import Any
 
@@ -41,7 +41,7 @@ TOLERANCE = 1e-6  # solved to 1e-8, none of 180 cases beside boundaries had anot
 
 @dataclass(frozen=True)
 class Case:
-    """A ring to be folded; parameters that its shape has not are None.
+    """A ring to be folded; parameters that its shape does not have are None.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ class Case:
     Raises
     ------
     ValueError
-        For an unknown shape, or a parameter that is missing or that the shape has not. Values are
-        checked where the case is solved.
+        For an unknown shape, or a parameter that is missing or that the shape does not have. Values
+        are checked where the case is solved.
     """
 
     shape: str
@@ -121,8 +121,8 @@ class Row:
     ----------
     case : what was solved
     label : one of LABELS, or FAILED
-    foldable, stable : see `der.records.path.folding_mode`; an unfoldable ring is not called stable
-    snapping : "none", "snap-through" or "snap-back", of unfoldable rings too
+    foldable, stable : see `der.records.path.folding_mode`; never stable if not foldable
+    snapping : "none", "snap-through" or "snap-back", also of rings that are not foldable
     moment, slope : M [GJ/a] and dM/dgamma at the first arrival at pi
     folds : gammas of the folds [rad], in path order
     error : largest estimated error on the path, of gamma/pi and of M over the largest |M|
@@ -182,12 +182,16 @@ def solve_case(case: Case) -> Row:
     from der.bvp.solve import solve_bvp  # kernels: only where cases are solved, not where counted
 
     started = time.perf_counter()
-    try:
-        path = solve_bvp(case.scene(save_at=()), tolerance=case.tolerance)
-        row = row_of(case, path)
-    except Exception as problem:  # whatever it is, it must not take the other cases along
-        row = failed(case, f"{type(problem).__name__}: {problem}")
+    row = row_by(case, partial(solve_bvp, tolerance=case.tolerance), save_at=())
     return replace(row, seconds=round(time.perf_counter() - started, 6))
+
+
+def row_by(case: Case, solve: Callable[[Scene], Path], **wanted: Any) -> Row:
+    """How a case folds by a solver, with further entries of its scene; nothing is raised."""
+    try:
+        return row_of(case, solve(case.scene(**wanted)))
+    except Exception as problem:  # whatever it is, the other cases go on
+        return failed(case, f"{type(problem).__name__}: {problem}")
 
 
 def failed(case: Case, why: str) -> Row:
@@ -217,7 +221,7 @@ def row_of(case: Case, path: Path) -> Row:
 
 
 def label_of(foldable: bool, stable: bool | None, snapping: str) -> str:
-    """The label of a folding mode; the snapping of unfoldable rings is no part of it.
+    """The label of a folding mode; snapping is no part of it where the ring is not foldable.
 
     M vanishes at 0 and pi of a foldable ring, so that it has a limit at least: FAILED without.
     """
@@ -230,17 +234,12 @@ def label_of(foldable: bool, stable: bool | None, snapping: str) -> str:
 
 def _error(path: Path) -> float | None:
     """Largest estimated error of a path, relative; None where one is not known."""
-    if path.error is None:
-        return None
     bars: Any = path.error
-    scales = (math.pi, float(np.abs(path.moment).max()))
-    parts = [
-        value / scale
-        for name, scale in zip(("gamma", "moment"), scales, strict=True)
-        for value in bars[name]
-        if value is not None
-    ]
-    return float(max(parts, default=math.nan)) if len(parts) == 2 * len(path) else None
+    if bars is None or None in (*bars["gamma"], *bars["moment"]):
+        return None
+    largest = float(np.abs(path.moment).max())
+    parts = [bar / math.pi for bar in bars["gamma"]] + [bar / largest for bar in bars["moment"]]
+    return float(max(parts))
 
 
 @cache

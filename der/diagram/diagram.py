@@ -12,12 +12,13 @@ import io
 import math
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path as File
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
-from der.diagram.cases import LABELS, PARAMETERS, Case, Row, solve_case
+from der.diagram.cases import LABELS, PARAMETERS, Row, solve_case
 from der.diagram.curves.slices import Boundaries
 from der.diagram.distributed import follow, loose_ends, unexplained
 from der.diagram.families import FAMILIES, Family, family
@@ -36,6 +37,8 @@ __all__ = ["FAMILIES", "PhaseDiagram", "phase_diagram"]
 
 STORE = "cases.jsonl"
 SAMPLE = 40
+
+Entries: TypeAlias = dict[str, Any]  # of a line of a table, by column; others are left out
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,7 +62,7 @@ class PhaseDiagram(Shown):
     corners: tuple[Corner, ...]
     compared: tuple[Compared, ...]
     files: tuple[File, ...]
-    seconds: tuple[float, float, float]
+    seconds: tuple[float, ...]
 
     @property
     def family(self) -> Family:
@@ -101,8 +104,8 @@ def phase_diagram(
 ) -> PhaseDiagram:
     """The phase diagram of a family of rings, written to a folder.
 
-    Every finished case is in `cases.jsonl` at once, so that a run that ends in whatever way, and is
-    resumed, loses none but those in flight. Afterwards `cases.csv`, `boundaries.csv`,
+    Every finished case is in `cases.jsonl` at once, so that a run that is stopped and resumed loses
+    only the cases in flight. Afterwards `cases.csv`, `boundaries.csv`,
     `corners.csv`, NAME.png, and `check.csv` are written.
 
     Parameters
@@ -135,7 +138,7 @@ def phase_diagram(
     if isinstance(sample, bool) or not isinstance(sample, int) or sample < 1:
         raise ValueError(f"sample must be an integer from 1, got {sample!r}")
     folder = _made(folder)
-    clock = [time.perf_counter()]
+    clock = [time.perf_counter()]  # at the start, and after each part
     with Store(folder / STORE) as store, started(workers, scheduler) as crew:
         if len(store) and not resume:
             raise ValueError(
@@ -143,21 +146,20 @@ def phase_diagram(
             )
         found = scan(wanted, store, crew, solve=solve, progress=progress)
         clock.append(time.perf_counter())
-        cases = _write(folder / "cases.csv", CASE_COLUMNS, map(_case_cells, found.sorted_rows))
+        cases = _write(folder / "cases.csv", CASE_COLUMNS, map(_of_case, found.sorted_rows))
         bounds = follow(found, store, crew, solve)
         beside = [row for row in store.rows.values() if wanted.unit(row.case) is not None]
     clock.append(time.perf_counter())
     compared = () if check is None else rod_check(found, check, sample)
     clock.append(time.perf_counter())
     files = (cases, *_written(folder, found, bounds, compared, beside))
-    seconds = (clock[1] - clock[0], clock[2] - clock[1], clock[3] - clock[2])
-    return PhaseDiagram(
-        found, tuple(bounds.curves), tuple(bounds.corners), compared, files, seconds
-    )
+    seconds = tuple(after - before for before, after in pairwise(clock))
+    curves, corners = tuple(bounds.curves), tuple(bounds.corners)
+    return PhaseDiagram(found, curves, corners, compared, files, seconds)
 
 
 def doubts(diagram: PhaseDiagram) -> list[str]:
-    """In what the boundaries of a diagram are not complete, a line each; none if they are."""
+    """What the boundaries of a diagram lack, a line each; none if they are complete."""
     family, curves = diagram.family, diagram.curves
     lines = []
     if left := unexplained(diagram.scan, curves):
@@ -166,7 +168,7 @@ def doubts(diagram: PhaseDiagram) -> list[str]:
         case = ends[0].case
         place = ", ".join(f"{name} = {getattr(case, name):.6g}" for name in family.parameters)
         lines.append(
-            f"ends of boundaries that lead nowhere: {len(ends)}, the first with {place}, "
+            f"loose ends of boundaries: {len(ends)}, the first with {place}, "
             f"about {case.twist_axis}"
         )
     return lines
@@ -176,13 +178,9 @@ def summary(diagram: PhaseDiagram) -> str:
     """Cases by label, what it took, and what was written, in a few lines."""
     rows = diagram.rows
     count = Counter(row.label for row in rows)
-    taken = "s, ".join(
-        f"{words} {seconds:.1f}"
-        for words, seconds in zip(("scan", "boundaries", "check"), diagram.seconds, strict=True)
-    )
-    lines = [
-        f"{diagram.family.name}: {len(rows)} cases, {diagram.scan.solved} solved now ({taken} s)"
-    ]
+    taken = "scan {:.1f}s, boundaries {:.1f}s, check {:.1f} s".format(*diagram.seconds)
+    name, solved = diagram.family.name, diagram.scan.solved
+    lines = [f"{name}: {len(rows)} cases, {solved} solved now ({taken})"]
     lines += [f"  {count[label]:6d}  {label}" for label in LABELS if count[label]]
     if bad := [row for row in rows if not row.ok]:
         lines.append(f"  {len(bad):6d}  failed, the first: {bad[0].message}")
@@ -217,80 +215,78 @@ def _written(
     compared: tuple[Compared, ...],
     beside: Sequence[Row],
 ) -> tuple[File, ...]:
-    """Write boundaries, check and picture; the table of cases has long been written."""
+    """Write boundaries, check and picture; the table of cases is already there."""
     from der.diagram.picture import picture
     from der.viz.plots.phase_diagram import draw
     from der.viz.plots.style import save
 
     curves, corners = bounds
     files = [
-        _write(folder / "boundaries.csv", BOUNDARY_COLUMNS, _boundary_cells(curves)),
-        _write(folder / "corners.csv", CORNER_COLUMNS, map(_corner_cells, corners)),
+        _write(folder / "boundaries.csv", BOUNDARY_COLUMNS, _of_boundaries(curves)),
+        _write(folder / "corners.csv", CORNER_COLUMNS, map(_of_corner, corners)),
     ]
     if compared:
-        files.append(_write(folder / "check.csv", CHECK_COLUMNS, map(_check_cells, compared)))
+        files.append(_write(folder / "check.csv", CHECK_COLUMNS, map(_of_check, compared)))
     file = folder / f"{found.family.name}.png"
     save(draw(picture(found, curves, beside)), file)
     return (*files, file)
 
 
-MODE_COLUMNS = ("label", "foldable", "stable", "snapping", "moment", "slope", "folds", "error")
-CASE_COLUMNS = ("shape", "twist_axis", *PARAMETERS, *MODE_COLUMNS, "status", "message")
-BOUNDARY_COLUMNS = ("boundary", "twist_axis", *PARAMETERS, "gamma", "moment", "error", "curve")
-CORNER_COLUMNS = ("boundary", "other", "twist_axis", *PARAMETERS, "gamma", "moment", "error")
+POINT_COLUMNS = ("twist_axis", *PARAMETERS, "gamma", "moment", "error")
+BOUNDARY_COLUMNS = ("boundary", *POINT_COLUMNS, "curve")
+CORNER_COLUMNS = ("boundary", "other", *POINT_COLUMNS)
+CASE_COLUMNS = (
+    *("shape", "twist_axis", *PARAMETERS, "label", "foldable", "stable", "snapping"),
+    *("moment", "slope", "folds", "error", "status", "message"),
+)
 CHECK_COLUMNS = (
     *("shape", "twist_axis", *PARAMETERS, "where", "agrees", "bvp", "rod"),
     *("moment_bvp", "moment_rod", "slope_bvp", "slope_rod", "message"),
 )
 
 
-def _case_cells(row: Row) -> list[str]:
-    """What a case took is left out, so that the same cases are the same file."""
-    folds = " ".join(map(repr, row.folds))
-    mode = [row.label, _word(row.foldable), _word(row.stable), row.snapping]
-    mode += [_number(row.moment), _number(row.slope), folds, _number(row.error)]
-    return [row.case.shape, row.case.twist_axis, *_values(row.case), *mode, row.status, row.message]
+def _of_case(row: Row) -> Entries:
+    """Entries of a case. Its time is no column, so that the same cases are the same file."""
+    return vars(row.case) | vars(row)
 
 
-def _boundary_cells(curves: Iterable[Curve]) -> Iterable[list[str]]:
+def _of_boundaries(curves: Iterable[Curve]) -> Iterator[Entries]:
     for n, curve in enumerate(curves):
+        own = {"boundary": curve.kind, "twist_axis": curve.twist_axis, "curve": str(n)}
         for point in curve.points:
-            numbers = map(_number, (point.gamma, point.moment, point.error))
-            yield [curve.kind, curve.twist_axis, *_values(point.case), *numbers, str(n)]
+            yield vars(point.case) | vars(point) | own
 
 
-def _corner_cells(corner: Corner) -> list[str]:
-    point = corner.point
-    numbers = map(_number, (point.gamma, point.moment, point.error))
-    kinds = corner.kinds[0], " + ".join(corner.kinds[1:])
-    return [*kinds, corner.twist_axis, *_values(point.case), *numbers]
+def _of_corner(corner: Corner) -> Entries:
+    first, *others = corner.kinds
+    own = {"boundary": first, "other": " + ".join(others), "twist_axis": corner.twist_axis}
+    return vars(corner.point.case) | vars(corner.point) | own
 
 
-def _check_cells(pair: Compared) -> list[str]:
-    bvp, rod = pair.bvp, pair.rod
-    numbers = map(_number, (bvp.moment, rod.moment, bvp.slope, rod.slope))
-    verdict = ["near" if pair.near else "away", _word(pair.agrees), bvp.label, rod.label]
-    case = bvp.case
-    return [case.shape, case.twist_axis, *_values(case), *verdict, *numbers, rod.message]
+def _of_check(pair: Compared) -> Entries:
+    where = {"where": "near" if pair.near else "away", "agrees": pair.agrees}
+    entries = vars(pair.bvp.case) | where | {"message": pair.rod.message}
+    for name, row in (("bvp", pair.bvp), ("rod", pair.rod)):
+        entries |= {name: row.label, f"moment_{name}": row.moment, f"slope_{name}": row.slope}
+    return entries
 
 
-def _values(case: Case) -> list[str]:
-    return [_number(getattr(case, name)) for name in PARAMETERS]
-
-
-def _number(value: float | None) -> str:
+def _text(value: Any) -> str:
+    """A cell: numbers come back bit for bit, and one that is not known is empty."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return " ".join(map(repr, value))
     return "" if value is None or not math.isfinite(value) else repr(float(value))
 
 
-def _word(truth: bool) -> str:
-    return "true" if truth else "false"
-
-
-def _write(file: File, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> File:
+def _write(file: File, columns: Sequence[str], rows: Iterable[Entries]) -> File:
     text = io.StringIO(newline="")
     table_of = csv.writer(text, lineterminator="\n")
     table_of.writerow(columns)
-    table_of.writerows(rows)
+    table_of.writerows([_text(entries[name]) for name in columns] for entries in rows)
     content = text.getvalue().encode()
     write_whole(file, lambda opened: opened.write(content))
     return file

@@ -1,7 +1,7 @@
-"""The boundaries of a scanned diagram, followed by workers that may die; and what they leave open.
+"""Distributed tracing of a diagram's boundaries, by workers that may die; and what is incomplete.
 
 Boundaries are complete where they separate all unlike neighbours of the scan (`unexplained`), and
-where none of them leads nowhere (`loose_ends`).
+where none of them has a loose end (`loose_ends`).
 """
 
 from __future__ import annotations
@@ -36,17 +36,16 @@ class _Task:
 
 
 def follow(found: Scan, store: Store, crew: Workers, solve: Solve) -> Boundaries:
-    """Boundaries followed in two parameters; what is solved for on the way is kept, too.
+    """Boundaries followed in two parameters; rows that are solved for them are kept, too.
 
-    The slices of a cube are shared out whole. One that ends its workers has the boundaries that the
-    scan sees there.
+    Each slice of a cube is one task. A slice that ends its workers has the boundaries of the scan.
 
     Raises
     ------
     OSError
         If a row cannot be written.
     RuntimeError
-        If workers die before they have done anything, or the executor has given up.
+        If workers die before they have done anything, or the executor has stopped.
     """
 
     def all_of(cases: Sequence[Case]) -> list[Row]:
@@ -108,7 +107,7 @@ def unexplained(found: Scan, curves: Iterable[Curve]) -> int:
 def loose_ends(
     family: Family, curves: Iterable[Curve], corners: Iterable[Corner]
 ) -> list[BoundaryPoint]:
-    """Ends of curves in the middle of nowhere.
+    """Loose ends of curves.
 
     They are neither corners, nor on an edge of their square, nor on another curve of it. A closed
     curve has no ends.

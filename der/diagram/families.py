@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from der.diagram.cases import TOLERANCE, Case
 from der.utils.checks import checked_number
@@ -71,13 +72,13 @@ class Family:
     def case(self, sheet: str, unit: Sequence[float]) -> Case:
         """The case at unit coordinates, each from 0 to 1.
 
-        A ring with b = a is the same about both axes, and said to be twisted about x.
+        A ring with b = a is the same about both axes; its axis is x.
         """
         values = dict(self.fixed)
         for name, part in zip(self.parameters, unit, strict=True):
             low, high = self.bounds(name, values)
             value = min(round(low + (high - low) * part, DIGITS), high)
-            # the widest fillet to the last bit: a straight piece of 1e-13 a is one that is left out
+            # the widest fillet to the last bit: a straight of 1e-13 a is left out
             values[name] = high if part == 1.0 else value
         if self.stadium:
             values["r_over_a"] = values["b_over_a"]
@@ -153,7 +154,7 @@ def family(
         nu=nu,
         marks=tuple(replace(m, nu=nu) for m in found.marks),
     )
-    for corner in _corners(found):
+    for corner in product((0.0, 1.0), repeat=found.dimension):
         if "r_over_a" in found.parameters and _empty(found, corner):
             low = new["r_over_a"][0]
             raise ValueError(f"r_over_a must begin below the widest fillet of all rings, got {low}")
@@ -168,13 +169,6 @@ def _checked_range(name: str, given: tuple[float, float]) -> tuple[float, float]
     if not low < high:
         raise ValueError(f"{name} must have a first value below its last, got {given!r}")
     return low, high
-
-
-def _corners(found: Family) -> list[tuple[float, ...]]:
-    corners: list[tuple[float, ...]] = [()]
-    for _ in found.parameters:
-        corners = [(*corner, end) for corner in corners for end in (0.0, 1.0)]
-    return corners
 
 
 def _empty(found: Family, corner: Sequence[float]) -> bool:
@@ -217,8 +211,8 @@ _OBTUSE = tuple(
 )
 _SHARP = Case("triangle", 4.0, vertex_angle=90.0, r_over_a=1 / 30)  # fig. 11b
 
-FAMILIES = {
-    "fig3a": Family(
+_FAMILIES = (
+    Family(
         "fig3a",
         "Elliptical rings",
         "ellipse",
@@ -227,7 +221,7 @@ FAMILIES = {
         sheets=("x", "y"),
         marks=_ELLIPSES,
     ),
-    "fig5a": Family(
+    Family(
         "fig5a",
         "Rounded rectangular rings",
         "rectangle",
@@ -238,7 +232,7 @@ FAMILIES = {
         coarse=8,
         finest=32,
     ),
-    "fig5b": Family(
+    Family(
         "fig5b",
         "Stadium rings, $r = b$",
         "rectangle",
@@ -248,7 +242,7 @@ FAMILIES = {
         stadium=True,
         marks=_SQUARES[-1:],
     ),
-    "fig5c": Family(
+    Family(
         "fig5c",
         "Rounded square rings, $a = b$",
         "rectangle",
@@ -257,7 +251,7 @@ FAMILIES = {
         fixed=(("b_over_a", 1.0),),
         marks=_SQUARES,
     ),
-    "fig8a": Family(
+    Family(
         "fig8a",
         "Rounded triangular rings",
         "triangle",
@@ -267,7 +261,7 @@ FAMILIES = {
         coarse=8,
         finest=32,
     ),
-    "fig8b": Family(
+    Family(
         "fig8b",
         "Rounded equilateral triangular rings, $\\alpha_T$ = 60°",
         "triangle",
@@ -276,7 +270,7 @@ FAMILIES = {
         fixed=(("vertex_angle", 60.0),),
         marks=_EQUILATERAL,
     ),
-    "fig8c": Family(
+    Family(
         "fig8c",
         "Rounded triangular rings, $\\alpha_T$ = 120°",
         "triangle",
@@ -285,7 +279,7 @@ FAMILIES = {
         fixed=(("vertex_angle", 120.0),),
         marks=_OBTUSE,
     ),
-    "circle": Family(
+    Family(
         "circle",
         "Circular rings with natural curvature",
         "circle",
@@ -293,4 +287,5 @@ FAMILIES = {
         ((0.0, 2.0), H_OVER_T),
         marks=tuple(Case("circle", h, natural_curvature=1.0) for h in (1.0, 1.6, 2.0, 4.0)),
     ),
-}
+)
+FAMILIES = {one.name: one for one in _FAMILIES}

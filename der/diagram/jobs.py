@@ -13,8 +13,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 AHEAD = 2  # tasks a worker that wait or run, so that none is idle
-DEATHS = 2  # of workers, by a thing that was worked on alone
-IN_VAIN = 8  # deaths of workers in a row with nothing done between: they cannot work here
+DEATHS = 2  # of workers, each by the same single thing: it is given up
+MOST_DEATHS = 8  # of workers in a row without a result between: they cannot work here
 
 
 class Jobs(Generic[T, R]):
@@ -38,21 +38,21 @@ class Jobs(Generic[T, R]):
         self._waiting = deque(batches)
         self._flight: dict[Future[R], tuple[T, ...]] = {}
         self._suspects: deque[T] = deque()
-        self._tried: T | None = None  # the suspect in flight, alone
+        self._tried: T | None = None  # the only thing in flight, where that is a suspect
         self._deaths: Counter[T] = Counter()
         self._condemned: list[T] = []  # held back until it is known that workers can work at all
-        self._in_vain = 0
+        self._in_a_row = 0
 
     def done(self) -> Iterator[tuple[tuple[T, ...], R | None]]:
-        """Batches and what came of them, as they are finished.
+        """Batches and their results, as they are finished.
 
-        Where a worker dies, what it may have had is tried again, one thing at a time. None came of
-        one that ended its worker then, DEATHS times.
+        Where a worker dies, the things that it may have had are tried again, one at a time. The
+        result of one that ends its worker DEATHS times is None.
 
         Raises
         ------
         RuntimeError
-            If workers die before they have done anything, or the executor has given up.
+            If workers die before they have done anything, or the executor has stopped.
         """
         while self._submit():
             for found in self._collect():
@@ -67,7 +67,7 @@ class Jobs(Generic[T, R]):
             yield (thing,), None
 
     def _submit(self) -> bool:
-        """Hand out what can be; whether anything is in flight."""
+        """Submit batches; return whether anything is in flight."""
         room = AHEAD * self._crew.width
         while (batch := self._next(room)) is not None:
             try:
@@ -82,7 +82,7 @@ class Jobs(Generic[T, R]):
     def _collect(self) -> Iterator[tuple[tuple[T, ...], R]]:
         """Wait, and give all batches that are finished."""
         done = wait(self._flight, return_when=FIRST_COMPLETED).done
-        if any(_lost(task) for task in done):  # the pool is gone, and all in flight with it
+        if any(_lost(task) for task in done):  # the pool is lost, with everything in flight
             done = wait(self._flight).done
         broken = False
         for task in done:
@@ -92,13 +92,13 @@ class Jobs(Generic[T, R]):
                 broken = True
                 continue
             found = task.result()
-            self._tried, self._in_vain = None, 0
+            self._tried, self._in_a_row = None, 0
             yield batch, found
         if broken:
             self._mend()
 
     def _next(self, room: int) -> tuple[T, ...] | None:
-        """What can be handed out next: a suspect only when nothing else is in flight."""
+        """The next batch to submit: a suspect only when nothing else is in flight."""
         if self._suspects:
             if self._flight:
                 return None
@@ -121,8 +121,8 @@ class Jobs(Generic[T, R]):
             self._condemned.append(thing)
 
     def _mend(self) -> None:
-        self._in_vain += 1
-        if self._in_vain >= IN_VAIN:
+        self._in_a_row += 1
+        if self._in_a_row >= MOST_DEATHS:
             raise RuntimeError("workers die before they have solved anything")
         self._crew.restart()
 
@@ -133,9 +133,9 @@ def _lost(task: Future[Any]) -> bool:
     Raises
     ------
     RuntimeError
-        If the executor has taken the task back.
+        If the executor has cancelled the task.
     """
     if task.cancelled():
-        raise RuntimeError("the scheduler has gone, or has taken tasks back")
+        raise RuntimeError("the scheduler has stopped, or has cancelled tasks")
     problem = task.exception()
     return problem is not None and died(problem)

@@ -115,7 +115,7 @@ def _nodes(scan: Scan, axis: str, k: int | None) -> tuple[Labels, Array]:
         i, j = low[0], low[-1]
         here = np.s_[i : i + edge + 1, j : j + edge + 1]
         labels[here] = NUMBERS[next((row.label for row in rows if row.ok), FAILED)]
-        # of a cube the mean of both faces: uniform cells, whose sign is all that is seen
+        # of a cube the mean of both faces: only its sign is seen in a uniform cell
         at = np.array([row.slope or 0.0 for row in rows]).reshape((2,) * len(low))
         corner = at if k is None else at.mean(axis=1)
         ramp = np.linspace((1.0, 0.0), (0.0, 1.0), edge + 1)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from der.diagram.cases import Row, failed, row_of
+from der.diagram.cases import Row, row_by
 from der.diagram.scan import Node, Scan, corners
 from der.records.path import Path
 from der.scene import Scene
@@ -18,7 +18,9 @@ from der.utils.checks import Array
 Fold: TypeAlias = Callable[[Scene], Path]
 
 AWAY = 0.02  # of the diagram's side: further than this from every boundary
-EDGES = 128  # of the full ring, and half and a quarter of them to extrapolate from
+# with half and a quarter of the edges, too, to extrapolate from
+WANTED: dict[str, Any] = {"n_edges": 128, "error_bars": True, "save_at": ()}
+WANTED |= {"stability": False, "self_crossings": False}
 
 
 @dataclass(frozen=True)
@@ -55,18 +57,10 @@ def rod_check(scan: Scan, fold: Fold, sample: int) -> tuple[Compared, ...]:
     away = _away(scan)
     chosen = [(node, True) for node in draw.sample(near, min(sample // 2, len(near)))]
     chosen += [(node, False) for node in draw.sample(away, min(sample - len(chosen), len(away)))]
-    return tuple(_compared(scan.rows[node], fold, near=near) for node, near in chosen)
-
-
-def _compared(row: Row, fold: Fold, *, near: bool) -> Compared:
-    try:
-        scene = row.case.scene(
-            n_edges=EDGES, error_bars=True, stability=False, self_crossings=False, save_at=()
-        )
-        rod = row_of(row.case, fold(scene))
-    except Exception as problem:  # a rod that cannot be folded is a row of the table
-        rod = failed(row.case, f"{type(problem).__name__}: {problem}")
-    return Compared(row, rod, near)
+    return tuple(
+        Compared(scan.rows[node], row_by(scan.rows[node].case, fold, **WANTED), near)
+        for node, near in chosen
+    )
 
 
 def _away(scan: Scan) -> list[Node]:

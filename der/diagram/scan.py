@@ -1,8 +1,8 @@
 """Adaptive scans: a coarse grid of cases, refined where the labels of neighbours differ.
 
 Nodes are points of the lattice of the finest level, (sheet, i, j) or (sheet, i, j, k); a cell is
-its lowest node and its edge, a power of two. Where cells are refined depends on labels alone, so
-that the result is the same for every order of the cases and number of workers, and after any
+its lowest node and its edge, a power of two. Where cells are refined depends only on
+labels. So the result is the same for every order of the cases and number of workers, and after any
 number of interruptions.
 """
 
@@ -211,7 +211,7 @@ def solve_all(
     OSError
         If a row cannot be written.
     RuntimeError
-        If workers die before they solve anything, or the executor has given up.
+        If workers die before they solve anything, or the executor has stopped.
     """
     work = partial(_solve_batch, solve)
     for batch, rows in Jobs(crew, work, _batches(cases, crew.width)).done():
@@ -238,31 +238,18 @@ def _solve_batch(solve: Solve, batch: Batch) -> list[Row]:
 
 @contextmanager
 def _progress(family: Family, *, shown: bool) -> Iterator[Level]:
-    """A bar with the time left, where somebody looks at it; told of every level of a scan."""
+    """A progress bar with the time left, on a terminal; it is told every level of a scan."""
     if not (shown and sys.stderr.isatty()):
         yield lambda edge, nodes, todo: None
         return
+    from rich import progress
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("cases,"),
-        TimeElapsedColumn(),
-        TextColumn("gone,"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
+        *("{task.description}", progress.BarColumn(), progress.MofNCompleteColumn(), "cases,"),
+        *(progress.TimeElapsedColumn(), "gone,", progress.TimeRemainingColumn(), "left"),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(family.name, total=None)
         done = 0
 

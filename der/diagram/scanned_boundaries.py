@@ -1,7 +1,7 @@
 """Boundaries of folding modes as a scan sees them: lines through its finest cells.
 
-A point lies between two neighbours that fold differently; `error` is the distance that it may be
-off, in the parameter that varies.
+A point lies between two neighbours that fold differently; `error` is the largest error of the
+parameter that varies.
 """
 
 from __future__ import annotations

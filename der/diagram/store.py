@@ -1,4 +1,4 @@
-"""Finished cases on disk: one line of JSON each, appended and synced, so that none is ever lost."""
+"""Finished cases on disk: one line of JSON each, appended and synced, so that none is lost."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path as File
-from types import TracebackType
 from typing import Self
 
 from der.diagram.cases import Row
@@ -17,8 +16,8 @@ from der.utils.files import FilePath
 class Store:
     """The rows of finished cases by key, in memory and in a file that only grows.
 
-    A line that was torn by a crash is cut off when the file is opened, and so is what a full disk
-    left of one. One process at a time.
+    An incomplete line, after a crash or on a full disk, is cut off when the file is opened.
+    One process at a time.
 
     Parameters
     ----------
@@ -46,12 +45,7 @@ class Store:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         os.close(self._open)
 
     def __len__(self) -> int:
@@ -91,7 +85,7 @@ class Store:
             raise ValueError(f"{self.file} is in use by another run") from None
 
     def _read(self) -> None:
-        """Take in all whole lines, and cut off what follows the last."""
+        """Read all complete lines, and cut off the rest."""
         content = self.file.read_bytes()
         self._end = content.rfind(b"\n") + 1
         os.ftruncate(self._open, self._end)
@@ -101,7 +95,7 @@ class Store:
                 key = entries.pop("key")
                 self.rows[key] = Row.from_json(entries)
             except (ValueError, KeyError, TypeError, AttributeError):
-                continue  # a line that nobody can read is a case that is solved again
+                continue  # the case of a line that cannot be read is solved again
 
     def _write(self, content: bytes) -> None:
         os.lseek(self._open, self._end, os.SEEK_SET)

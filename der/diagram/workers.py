@@ -15,30 +15,11 @@ from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import wait
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from der.utils.interrupts import interrupts_ignored
 
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-
-class Workers(Protocol):
-    """What a scan needs to know of its executor."""
-
-    executor: Executor
-
-    @property
-    def width(self) -> int:
-        """How many tasks are done at a time."""
-
-    def restart(self) -> None:
-        """Replace an executor that broke."""
-
-    def close(self) -> None:
-        """End them once their work is done."""
-
-    def stop(self) -> None:
-        """End at once; tasks in flight are lost."""
 
 
 def died(problem: BaseException) -> bool:
@@ -97,7 +78,7 @@ class Processes:
         self.executor.shutdown()
 
     def stop(self) -> None:
-        """End them; none has anything on disk that could be torn."""
+        """End them; none has an unfinished file."""
         with interrupts_ignored():
             for process in set(multiprocessing.active_children()) - self._others:
                 process.terminate()
@@ -114,7 +95,7 @@ class Cluster:
     Raises
     ------
     ValueError
-        If Dask is not installed, or nobody answers at the address.
+        If Dask is not installed, or no scheduler answers at the address.
     """
 
     def __init__(self, address: str) -> None:
@@ -139,16 +120,19 @@ class Cluster:
         return max(1, sum(self._client.nthreads().values()))
 
     def restart(self) -> None:
-        """Nothing: the cluster mends itself."""
+        """Do nothing: the cluster replaces workers itself."""
 
     def close(self) -> None:
         """Leave."""
         self.stop()
 
     def stop(self) -> None:
-        """Take back what is not done, and leave."""
+        """Cancel what is not done, and leave."""
         self.executor.shutdown(wait=False)
         self._client.close()
+
+
+Workers: TypeAlias = Processes | Cluster
 
 
 def processes(number: int | None) -> int:
@@ -191,7 +175,7 @@ def _start() -> None:
 
 
 def _leave_with_parent() -> None:
-    """A parent that is killed outright closes no queue, and its workers would wait for ever."""
+    """End with the parent: a killed one closes no queue, and workers would wait for ever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -63,7 +63,7 @@ def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
     if n_cells < len(joints) - 1:
         joints = [begin, end]
     segments = [_segment(ring, a, b) for a, b in pairwise(joints)]
-    # a straight that rounding leaves between two fillets deserves no cell of its own
+    # a straight that rounding leaves between two fillets has no cell of its own
     least = FEW * sum(segment.weight for segment in segments) / n_cells
     if any(segment.weight < least for segment in segments):
         kept = [segment.end for segment in segments[:-1] if segment.weight >= least]
@@ -83,7 +83,7 @@ def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
 
 
 class _Segment:
-    """A piece of the ring with smooth natural curvature, and the density of frames on it."""
+    """A part of the ring with smooth natural curvature, and the density of frames on it."""
 
     def __init__(self, ring: Ring, begin: float, end: float) -> None:
         self.end = end

@@ -7,7 +7,7 @@ counter-clockwise; halfway, at s = L/2, it crosses the positive second axis. Its
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Protocol, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,31 +19,6 @@ Piece: TypeAlias = tuple[float, float]  # length, curvature
 
 ROUNDING = 1e-14  # lengths below this are none: the straights left by the largest fillet, say
 LARGEST_TURN = 4 * np.pi  # of one piece: beyond, the Gauss sums lose digits
-
-
-class Outline(Protocol):
-    """A closed planar curve, s in [0, L]."""
-
-    @property
-    def length(self) -> float:
-        """Full length L."""
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Arc lengths of the jumps in curvature."""
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """Arc lengths at which the curvature is not smooth, jumps among them."""
-
-    def angle(self, s: Array) -> Array:
-        """Tangent angle Theta, from 0 to 2 pi."""
-
-    def curvature(self, s: Array) -> Array:
-        """Theta', right-continuous."""
-
-    def place(self, s: Array) -> ComplexArray:
-        """Position."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +87,7 @@ class PiecewiseLinear:
         return self.knot_place[i] + chord
 
     def _locate(self, s: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return for each `s` its piece, the way into it and the curvature's slope there."""
+        """Return for each `s` its piece, the arc length into it and the curvature's slope there."""
         last = len(self.curvature_start) - 1
         i = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, last)
         rise = self.curvature_end[i] - self.curvature_start[i]
@@ -175,6 +150,8 @@ class Ellipse:
 
     across: float  # semi-axis along the first axis
     along: float  # semi-axis along the second
+    breaks: ClassVar[tuple[float, ...]] = ()  # its curvature is analytic
+    kinks: ClassVar[tuple[float, ...]] = ()
 
     @cached_property
     def length(self) -> float:
@@ -182,16 +159,6 @@ class Ellipse:
         from scipy.special import ellipe
 
         return 4 * self.across * float(ellipe(self._m))
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """No jumps in curvature."""
-        return ()
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """None: its curvature is analytic."""
-        return ()
 
     def angle(self, s: Array) -> Array:
         """Tangent angle at `s`."""
@@ -239,3 +206,6 @@ class Ellipse:
             if np.max(np.abs(residual), initial=0.0) <= 1e-14 * self.length:
                 return tau
         raise ValueError(f"an ellipse of semi-axes {self.across}, {self.along} is too slender")
+
+
+Outline: TypeAlias = PiecewiseLinear | Ellipse  # a closed planar curve, s in [0, L]

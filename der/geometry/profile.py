@@ -29,7 +29,7 @@ def profile_of_knots(
     Parameters
     ----------
     arc_length, curvature : array_like, shape (n,)
-        Along the whole curve; linear between the knots; an arc length given twice is a jump.
+        Along the complete curve; linear between the knots; an arc length given twice is a jump.
 
     Raises
     ------

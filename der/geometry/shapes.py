@@ -141,7 +141,7 @@ def triangle_in_degrees(vertex_angle: float, r_over_a: float) -> Ring:
     base_turn, apex_turn = (np.pi + apex) / 2, np.pi - apex
     base_cut, apex_cut = r * math.tan(base_turn / 2), r * math.tan(apex_turn / 2)
     straights = 1 / 2 - base_cut, 1 / 2 / math.sin(apex / 2) - base_cut - apex_cut
-    if r == inscribed:  # a circle; what rounding leaves of a straight would bend one arm alone
+    if r == inscribed:  # a circle; a straight that rounding leaves would bend one arm only
         straights = 0.0, 0.0
     outline = closed_curve(
         straight(straights[0]), arc(r, base_turn), straight(straights[1]), arc(r, apex_turn / 2)
@@ -160,7 +160,7 @@ def profile(
     Parameters
     ----------
     arc_length, curvature : array_like, shape (n,)
-        Natural curvature along the whole closed ring, counter-clockwise from the first grip (arc
+        Natural curvature along the complete ring, counter-clockwise from the first grip (arc
         length 0) back to it, in units of the user's a and 1/a; linear between the knots. An arc
         length given twice is a jump.
     points : array_like, shape (n, 2), n >= 8

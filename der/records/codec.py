@@ -76,8 +76,7 @@ def _converter() -> Any:
         lambda hint: isclass(hint) and issubclass(hint, Checked), of_object
     )
     converter.register_structure_hook_func(
-        lambda hint: not _is_tuple(hint) and entry_of(hint) is not None,
-        lambda value, _: value,
+        lambda hint: not _is_tuple(hint) and entry_of(hint) is not None, lambda value, _: value
     )
     return converter
 

@@ -199,12 +199,7 @@ class Path(Record, name="path", plot="path"):
 
 
 def folding_mode(
-    gamma: Array,
-    moment: Array,
-    points: Sequence[Point],
-    at_pi: AtPi,
-    *,
-    three_covered: bool,
+    gamma: Array, moment: Array, points: Sequence[Point], at_pi: AtPi, *, three_covered: bool
 ) -> Mode:
     """Folding mode of a path that starts at gamma = 0.
 

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from dataclasses import replace
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from der.errors import ContinuationFailed, Interrupted, NotConverged, Reason
@@ -43,12 +42,7 @@ class Run:
         self._pressed = self._stack.enter_context(interrupts_between_states())
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
         if self._pressed:
             self.stop(Reason.INTERRUPTED)

@@ -93,7 +93,7 @@ def test_stability_is_the_same_about_both_axes(about_y):
         state = next(seeds("stability", solve_case(of.case("x", place + np.array([0.0, 0.01])))))
 
         def slope(u, seed):
-            found = KINDS["stability"].condition(of.case("x", u).scene(), seed)
+            found = KINDS["stability"](of.case("x", u).scene(), seed)
             return found.value, found
 
         on_it = corrected(slope, place, state)
@@ -168,7 +168,7 @@ def test_infinite_slope_bounds_foldability(beside, foldable):
     seed = next(seeds("infinite slope", row))
 
     def value(u, state):
-        found = KINDS["infinite slope"].condition(case(u).scene(), state)
+        found = KINDS["infinite slope"](case(u).scene(), state)
         return found.value, found
 
     low, high, state = 0.24, 0.35, seed
@@ -217,7 +217,7 @@ def test_infinite_slope_is_followed_where_folded_states_merge():
     assert len(met) == 2
     found = [curve[meeting.first] for meeting in met]
     for at in found:
-        slope = KINDS["infinite slope"].condition(scene(at.u), at.state)
+        slope = KINDS["infinite slope"](scene(at.u), at.state)
         assert slope.value == pytest.approx(0.0, abs=1e-6)
         assert slope.at.moment == pytest.approx(0.0, abs=1e-9)
     assert abs(found[0].state.at.p[0] - found[1].state.at.p[0]) > 0.02
@@ -336,9 +336,7 @@ def test_an_exchange_touches_a_cusp():
 
     def condition(kind):
         def value(u, seed):
-            found = KINDS[kind].condition(
-                of.case("x", (float(u[0]), 0.0, float(u[1]))).scene(), seed
-            )
+            found = KINDS[kind](of.case("x", (float(u[0]), 0.0, float(u[1]))).scene(), seed)
             return found.value, found
 
         return value

@@ -154,7 +154,7 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch, ca
     assert drawn == told[-2:]
     assert re.fullmatch(r"fig3a: edges of the scan without a boundary .*: \d+", told[0])
     assert re.fullmatch(
-        r"fig3a: ends of boundaries that lead nowhere: \d+, the first with b_over_a = .*", told[-1]
+        r"fig3a: loose ends of boundaries: \d+, the first with b_over_a = .*", told[-1]
     )
 
 

@@ -43,10 +43,7 @@ def test_headline_has_ring_section_and_mesh():
     [
         ({"alpha": 0.75, "beta": 12.0, "h_over_t": None, "nu": None}, "alpha 0.75, beta 12"),
         ({"alpha": 0.75, "beta": 12.0}, "alpha 0.75, beta 12"),
-        (
-            {"alpha": 0.75, "beta": 12.0, "h_over_t": 4.0, "nu": None},
-            "h/t 4 (alpha 0.75, beta 12)",
-        ),
+        ({"alpha": 0.75, "beta": 12.0, "h_over_t": 4.0, "nu": None}, "h/t 4 (alpha 0.75, beta 12)"),
     ],
 )
 def test_headline_says_what_is_known_of_the_section(section, words):

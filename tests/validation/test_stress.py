@@ -233,7 +233,7 @@ def test_a_good_path_has_no_faults(bar):
     """Neither in the record nor in its balance, and energy is work."""
     scene, path = bar
     assert not list(stress_checks.faults(scene, path))
-    assert not list(kinds.balance(scene, path, path.shapes))
+    assert not list(kinds.balanced(scene, path, path.shapes))
     assert stress_checks.work_lost(path) < 1e-3
 
 
@@ -296,7 +296,7 @@ def test_a_state_out_of_balance_is_seen(bar):
     """Frames of one state with the gamma, moment and energy of its neighbour."""
     scene, path = bar
     shapes = replace(path.shapes, x=path.shapes.x[::-1], frames=path.shapes.frames[::-1])
-    found = names(kinds.balance(scene, path, shapes))
+    found = names(kinds.balanced(scene, path, shapes))
     assert {"energy of the full ring", "moment of the full ring"} <= found
 
 

@@ -32,9 +32,7 @@ FEWEST = {"rod, extrapolated": 32}
 
 
 def attempts(
-    scene: Callable[..., der.Scene],
-    extent: Extent,
-    rods: Mapping[str, Mapping[str, object]] = ROD,
+    scene: Callable[..., der.Scene], extent: Extent, rods: Mapping[str, Mapping[str, object]] = ROD
 ) -> Iterator[Attempt]:
     """All methods over their numbers of edges or tolerances.
 

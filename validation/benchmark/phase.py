@@ -23,7 +23,7 @@ from der.diagram.families import family
 from der.diagram.scan import Solve, solve_all
 from der.diagram.store import Store
 from der.diagram.workers import Workers, workers
-from validation.arguments import Arguments
+from scenarios.output import Arguments
 from validation.benchmark.rows import Row
 
 DIAGRAM = "fig3a"

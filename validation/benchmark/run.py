@@ -18,17 +18,7 @@ from pathlib import Path
 
 from der.utils.checks import shown
 from der.utils.files import write_whole
-from validation.benchmark import (
-    methods,
-    needs,
-    orders,
-    paths,
-    rings,
-    scaling,
-    start,
-    state,
-    sweep,
-)
+from validation.benchmark import methods, needs, orders, paths, rings, scaling, start, state, sweep
 from validation.benchmark.cited import CITED, cited
 from validation.benchmark.extent import FULL, QUICK, Extent
 from validation.benchmark.rows import Row, Trial, machine

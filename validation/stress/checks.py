@@ -16,10 +16,10 @@ import numpy as np
 from der.errors import Reason
 from der.geometry.mesh import sites
 from der.records.configurations import Shapes
-from der.records.path import Path, Point
+from der.records.path import NUMBERS, Path, Point
 from der.scene import Scene
 from der.utils.checks import Array
-from validation.stress.random_rings import DENSE, LOOSE, largest_error, work_missing
+from validation.stress.random_rings import DENSE, largest_error, work_missing
 
 Fault = tuple[str, str]  # a name, which is the reason in the summary, and a sentence
 
@@ -62,14 +62,11 @@ def _start(path: Path) -> Iterator[Fault]:
 def _end(scene: Scene, path: Path) -> Iterator[Fault]:
     """A finished path ends where it was to end, and has been where it was to be solved for."""
     last = float(path.gamma[-1])
+    expected = {0.0} if scene.unload else {scene.gamma_max}
     if path.reason == Reason.TURNED_BACK.word:
         expected = {-scene.gamma_max}
-    elif scene.unload:
-        expected = {0.0}
     elif scene.until == "folded":
-        expected = {scene.gamma_max, math.pi, -math.pi}
-    else:
-        expected = {scene.gamma_max}
+        expected |= {math.pi, -math.pi}
     if last not in expected:
         yield "end", f"the path is done but ends at gamma = {last!r}"
     if scene.control == "moment":  # under a dead moment gamma leaps
@@ -90,11 +87,7 @@ def _points(path: Path) -> Iterator[Fault]:
         yield "points", f"the points are not in path order: {places}"
     for point in path.points:
         k = point.position
-        if (point.gamma, point.moment, point.energy) != (
-            path.gamma[k],
-            path.moment[k],
-            path.energy[k],
-        ):
+        if any(getattr(point, name) != getattr(path, name)[k] for name in NUMBERS):
             yield "points", f"the {point.kind} at gamma = {point.gamma} is not state {k}"
         known = point.index_before is not None and point.index_after is not None
         if point.kind == "fold" and known and path.numerics.get("control") == "arclength":
@@ -114,10 +107,8 @@ def _monotonic(path: Path, tolerance: float) -> Iterator[Fault]:
             continue
         back = low + np.flatnonzero(rise * np.sign(rise.sum()) < 0.0)
         if all({k, k + 1} & crossings for k in back.tolist()):
-            yield (
-                "out of order",
-                f"a self-crossing stands in the wrong place at {path.gamma[back[0]]}",
-            )
+            place = path.gamma[back[0]]
+            yield "out of order", f"a self-crossing stands in the wrong place at {place}"
             return
         yield "missed fold", f"gamma turns between {path.gamma[low]} and {path.gamma[high]}"
     rounding = max(MONOTONIC * float(np.abs(path.moment).max()), 100.0 * tolerance)
@@ -146,7 +137,7 @@ def _indices(path: Path) -> Iterator[Fault]:
 def _errors(path: Path) -> Iterator[Fault]:
     """Error bars are numbers >= 0."""
     entries: Any = path.error
-    for name in ("gamma", "moment", "energy"):
+    for name in NUMBERS:
         known = [bar for bar in entries[name] if bar is not None]
         if any(bar < 0.0 for bar in known):
             yield "error bar", f"an error of {name} is {min(known)}"
@@ -197,14 +188,9 @@ def denser(path: Path, last: float) -> tuple[float, ...]:
 def _part(path: Path, low: int, high: int) -> Path:
     """The states from ``low`` up to ``high`` as a path of their own."""
     keep = slice(low, high)
-    entries = {name: getattr(path, name)[keep] for name in ("gamma", "moment", "energy")}
-    entries |= {name: getattr(path, name)[keep] for name in ("index", "index_moment")}
+    columns = (*NUMBERS, "index", "index_moment")
+    entries: dict[str, Any] = {name: getattr(path, name)[keep] for name in columns}
     return replace(path, **entries, points=(), error=None, raw=None, shapes=None)
-
-
-def is_work(path: Path) -> bool:
-    """Whether energy is work to what interpolation between the states can tell."""
-    return work_lost(path) <= LOOSE
 
 
 def too_uncertain(path: Path, tolerance: float) -> Iterator[Fault]:

@@ -28,9 +28,8 @@ from pathlib import Path as File
 from der.diagram.cases import Case, Row, solve_case
 from der.diagram.diagram import STORE, phase_diagram
 from der.diagram.store import Store
-from validation.arguments import Arguments
+from scenarios.output import Arguments
 
-MODULE = "validation.stress.kill_and_resume"
 NOTES = "RING_ORIGAMI_NOTES"  # environment: the file that workers write to
 TABLES = ("cases.csv", "boundaries.csv", "corners.csv")
 EARLY = 0.2  # of the kills: while the run is starting

@@ -13,15 +13,16 @@ from scipy.spatial.transform import Rotation
 
 import der
 from der.analysis import fold as folding
-from der.analysis.request import Request
+from der.analysis.request import Request, ring_of
 from der.bvp.solve import solve_bvp
 from der.errors import NotConverged
 from der.geometry.section import Scale
 from der.kernels.assembly import assemble
 from der.kernels.linking import link
 from der.records.configurations import Shapes
-from der.records.path import Path
-from der.rod.gripped_ring import GrippedRing, gripped_ring
+from der.records.path import NUMBERS, Path
+from der.rod.free_ring import balance
+from der.rod.gripped_ring import GrippedRing
 from der.scene import CROSSINGS_UP_TO, Scene
 from der.utils.checks import Array
 from validation.stress.cases import KINDS, scene_of
@@ -96,7 +97,7 @@ def _judged(scene: Scene, path: Path) -> Iterator[Fault]:
         return
     yield from faults(scene, path)
     if path.shapes is not None:
-        yield from balance(scene, path, path.shapes)
+        yield from balanced(scene, path, path.shapes)
         symmetric = scene.control == "arclength" or scene.sector == "auto"
         if symmetric and scene.tolerance <= LOOSEST and scene.ring.shape != "profile":
             off = asymmetry(scene, path.shapes)
@@ -110,45 +111,37 @@ def _judged(scene: Scene, path: Path) -> Iterator[Fault]:
 
 def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator[Fault]:
     """Energy is work; where the states are too few to tell, they are asked for again, densely."""
-    lost = work_lost(path)
-    if lost > LOOSE and path.status == "done":
-        densely = replace(
-            scene, save_at=denser(path, scene.gamma_max), shapes=False, error_bars=False
-        )
-        lost = work_lost(solver(densely), asked=True)
-    if lost > LOOSE and path.status == "done":
+    if path.status != "done" or work_lost(path) <= LOOSE:
+        return
+    gammas = denser(path, scene.gamma_max)
+    lost = work_lost(
+        solver(replace(scene, save_at=gammas, shapes=False, error_bars=False)), asked=True
+    )
+    if lost > LOOSE:
         yield "energy is not work", f"U and the integral of 4 M dgamma differ by {lost:.2g} of U"
 
 
-def _returned(scene: Scene, path: Path, steps: float = RETURNED) -> Iterator[Fault]:
+def _returned(scene: Scene, path: Path) -> Iterator[Fault]:
     """After a loop without a snap the ring is where it was."""
     if path.shapes is None or scene.tolerance > LOOSEST or path.gamma[-1] != path.gamma[0]:
         return
     off = float(np.abs(path.shapes.x[-1] - path.shapes.x[0]).max())
-    limit = 1e-3 if scene.solver == "relaxation" else steps
-    if off > limit:
+    if off > (1e-3 if scene.solver == "relaxation" else RETURNED):
         yield "no return", f"the ring comes back {off:.2g} a away from where it was"
 
 
-def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
+def balanced(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
     """Every state, whatever sector it was found on, is an equilibrium of the full ring.
 
     Its frames are taken from the record; the internal forces, which are not in it, are fitted. So
     residual, energy and moment are computed anew, and Tw + Wr.
     """
-    ring = gripped_ring(
-        scene.ring,
-        scene.section,
-        scene.n_edges,
-        name="full",
-        measure=scene.curvature,
-        stretching=scene.stretching,
-    )
+    ring = ring_of(scene, "full")
     raw = path.raw or {}
     rod = ring.rod
     # arc lengths are rounded, and so are cells, which are their differences
     rounding = 1e-15 * scene.ring.length * float(rod.stiffness.max() / rod.cell.min() ** 2)
-    columns = [np.asarray(raw.get(name, getattr(path, name))) for name in _COLUMNS]
+    columns = [np.asarray(raw.get(name, getattr(path, name))) for name in NUMBERS]
     scales = [max(float(np.abs(column).max(initial=0.0)), 1e-3) for column in columns]
     tolerance = max(scene.tolerance, 1e-8 if scene.solver == "relaxation" else 0.0)
     if scene.stretching and tolerance > LOOSEST:  # a gap, all in one edge, would be stretch
@@ -176,7 +169,6 @@ def balance(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
             yield f"{name} of the full ring", f"{size:.3g} times what rounding allows"
 
 
-_COLUMNS = ("gamma", "moment", "energy")
 _BALANCED = ("residual", "energy", "moment", "link")
 
 
@@ -190,18 +182,9 @@ def _residual(
     ring: GrippedRing, quat: Array, stretch: Array, gamma: float
 ) -> tuple[float, float, float, float]:
     """Residual, its rounding error, energy and M of a state of the full ring."""
-    supports = ring.supports
-    force = np.zeros(len(supports.target))
-    system = assemble(ring.rod, supports, quat, stretch, force, gamma)
-    free = supports.free.reshape(-1)
-    gradient = system.grad.reshape(-1)[free]
-    border = system.border.reshape(-1, len(force))[free]
-    force = -np.linalg.lstsq(border, gradient, rcond=None)[0]
-    system = assemble(ring.rod, supports, quat, stretch, force, gamma)
-    residual = max(
-        float(np.abs(system.grad.reshape(-1)[free]).max()), float(np.abs(system.gap).max())
-    )
-    return residual, system.noise, system.energy, ring.arm_moment(system.load_grad)
+    found = balance(ring.rod, quat, stretch, ring.supports, gamma)
+    system = assemble(ring.rod, ring.supports, *found.state)
+    return found.residual, system.noise, system.energy, ring.arm_moment(system.load_grad)
 
 
 # --- The other kinds -------------------------------------------------------------------------

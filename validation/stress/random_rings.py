@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -22,10 +23,10 @@ from der.geometry.ring import Ring
 from der.geometry.section import Section
 from der.records.path import Path
 from der.scene import Scene
+from scenarios.random_folds import DENSE as DENSE
+from scenarios.random_folds import LOOSE as LOOSE
 from scenarios.random_folds import random_rings as random_rings
-
-LOOSE = 1e-3  # of U: what the work between states is known to by interpolation
-DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt
+from scenarios.random_folds import work_faults
 
 
 @dataclass(frozen=True)
@@ -58,32 +59,27 @@ def survey(count: int, seed: int, tolerance: float = TOLERANCE) -> Survey:
     seconds = []
     reached = 0
     for ring, section in islice(random_rings(count, seed), count):
+        scene = Scene(ring, section)
         try:
-            path = solve_bvp(Scene(ring, section), tolerance=tolerance)
+            path = solve_bvp(scene, tolerance=tolerance)
+            reached += path.at_pi is not None
+            found = list(faults(scene, path, tolerance))
         except NotConverged as failure:
-            suspects.append(Suspect(ring, section, "not converged", str(failure)))
-            seconds.append(failure.path.timing.solve_s)
-            continue
+            path, found = failure.path, [("not converged", str(failure))]
         seconds.append(path.timing.solve_s)
-        reached += path.at_pi is not None
-        for name, message in faults(ring, section, path, tolerance):
-            suspects.append(Suspect(ring, section, name, message))
+        suspects += [Suspect(ring, section, name, message) for name, message in found]
     return Survey(count, reached, tuple(suspects), tuple(seconds))
 
 
-def faults(ring: Ring, section: Section, path: Path, tolerance: float) -> Iterator[tuple[str, str]]:
+def faults(scene: Scene, path: Path, tolerance: float) -> Iterator[tuple[str, str]]:
     """Names of what is wrong with a path to pi, each with a sentence."""
     if path.at_pi is None or path.gamma[-1] != math.pi:
         yield "not at pi", f"the path ends at gamma = {path.gamma[-1]:.9f}"
     largest = largest_error(path)
     if not largest <= tolerance:
         yield "error", f"an error of {largest:.2g} is estimated"
-    missing = work_missing(path)
-    if missing > LOOSE:  # are there too few states, or is the path broken?
-        dense = tuple(np.linspace(0.0, math.pi, DENSE + 1))
-        missing = work_missing(solve_bvp(Scene(ring, section, save_at=dense), tolerance=tolerance))
-        if missing > LOOSE:
-            yield "work", f"U and the integral of 4 M dgamma differ by {missing:.2g} of U"
+    for text in work_faults(scene, path, partial(solve_bvp, tolerance=tolerance)):
+        yield "work", text
 
 
 def largest_error(path: Path) -> float:

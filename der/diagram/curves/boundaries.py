@@ -40,7 +40,6 @@ from der.diagram.curves.pruning import (
     beside,
     pieces_of,
     unlike,
-    where,
 )
 from der.diagram.curves.slices import Boundaries, Slice, SliceCases, Solve, joined, slices
 from der.diagram.curves.tracing import At, Function, States, corrected, trace
@@ -52,7 +51,7 @@ from der.scene import Scene
 NARROW = 1e-3  # of the side: cases so near to each other have the state that a condition needs
 NEAREST = 1e-4  # likewise, beside the end of another curve
 SHARPER = 8  # halvings between such points of a curve
-ROUNDS, ROUND = 3, 12  # of looking round such ends, and in how many places
+ROUNDS, ROUND = 3, 12  # searches around loose ends, and places of each
 BISECTED = 1e-6  # of the diagram's side
 REACH = 3.0  # gaps of the scan within which a crossing must find its curve
 EXCHANGE = "exchange"
@@ -99,10 +98,10 @@ class _Search:
         self.cases = cases
 
     def located(self) -> Boundaries:
-        """All boundaries between the cases of a scan."""
+        """Return the boundaries between the cases of a scan."""
         lines: list[Line] = []
         crossings = crossings_of(self.cases.placed)
-        for crossing in crossings:  # one after the other: a curve explains many
+        for crossing in crossings:  # in order: one curve explains many
             if not _explained(crossing, lines):
                 self._trace(crossing, lines)
         kept, met = self._kept(lines)
@@ -110,7 +109,7 @@ class _Search:
         found = len(lines)
         left = self.cases.bisected(left, NARROW)
         for narrow in left:
-            # so close to the boundary the state that makes it is almost there
+            # near the boundary, a state is close to the one that makes it
             if not _explained(narrow, kept):
                 self._trace(narrow, lines)
         if len(lines) > found:
@@ -131,26 +130,30 @@ class _Search:
 
     # --- curves of a condition ---
 
-    def _trace(self, crossing: Crossing, lines: list[Line]) -> None:
-        """Add the curves that may bound what differs between two cases, until one does."""
+    def _trace(self, crossing: Crossing, lines: list[Line], *, one_new: bool = False) -> None:
+        """Add the curves that may bound what differs between two cases, until one does.
+
+        ``one_new``: until a new one is found, instead.
+        """
         for kind in _bounding(crossing.kind):
             points = self._traced(kind, crossing)
-            if points and not _known(kind, points, lines):
+            new = bool(points) and not _known(kind, points, lines)
+            if new:
                 lines.append(Line(kind, points, [None] * len(points)))
-            if points and _explained(crossing, lines):
+            if new if one_new else points and _explained(crossing, lines):
                 return
 
     def _continued(
         self, lines: list[Line], kept: list[Line], met: list[Met]
     ) -> tuple[list[Line], list[Met]]:
-        """What is kept, with the curves on which those that lead nowhere go on."""
+        """Kept curves and corners, with the curves that continue those with loose ends."""
         asked: list[Array] = []
         for _ in range(ROUNDS):
             before = len(lines)
             ends = [end for end in _loose(kept, met) if distance(end, np.array(asked)) > BESIDE]
             asked += ends
             for crossing in self.cases.bisected(self._around(ends, kept), NEAREST):
-                self._trace_all(crossing, lines)
+                self._trace(crossing, lines, one_new=True)
             if len(lines) == before:
                 break
             kept, met = self._kept(lines)
@@ -173,14 +176,6 @@ class _Search:
                         found.append(Crossing(kind, a, b, first, second))
         return found
 
-    def _trace_all(self, crossing: Crossing, lines: list[Line]) -> None:
-        """Add the first curve that is not known and may bound what differs between two cases."""
-        for kind in _bounding(crossing.kind):
-            points = self._traced(kind, crossing)
-            if points and not _known(kind, points, lines):
-                lines.append(Line(kind, points, [None] * len(points)))
-                return
-
     def _traced(self, kind: str, crossing: Crossing) -> list[At[Value]]:
         """The curve between two cases, followed to its ends; none where no condition finds one."""
         condition = self._condition(kind)
@@ -195,7 +190,7 @@ class _Search:
         return []
 
     def _condition(self, kind: str) -> Function[Value]:
-        condition = KINDS[kind].condition
+        condition = KINDS[kind]
 
         def value(u: Array, seed: Value) -> tuple[float, Value]:
             try:
@@ -210,7 +205,7 @@ class _Search:
         return value
 
     def _scene(self, u: Array) -> Scene:
-        """The scene at a place; derivatives by a state ask for the same one again."""
+        """The scene at a place, cached: derivatives need the same one again."""
         return _scene(self.cases.case(u))
 
     def _states(self) -> States[Value]:
@@ -246,7 +241,7 @@ class _Search:
         """Pieces of curves on whose two sides the modes differ by their kind, and their corners."""
         lines = [Line(line.kind, list(line.points), [None] * len(line.points)) for line in lines]
         met = mark_corners(lines, self._condition)
-        asked = [(n, k) for n, line in enumerate(lines) for k in where(asked_beside(line))]
+        asked = [(n, k) for n, line in enumerate(lines) for k in asked_beside(line)]
         holds: list[list[bool | None]] = [[None] * len(line.points) for line in lines]
         for _ in range(SHARPER):
             for (n, k), held in zip(asked, self._hold(lines, asked), strict=True):
@@ -266,7 +261,7 @@ class _Search:
         return kept, [one for one in met if len(one.kinds) > 1]
 
     def _hold(self, lines: list[Line], asked: list[tuple[int, int]]) -> Iterator[bool | None]:
-        """Whether the modes on the two sides of points differ; None where that is not to be had."""
+        """Whether the modes on the two sides of points differ; None where that is not known."""
         sides = [beside(lines[n], k, lines) for n, k in asked]
         rows = iter(self.cases.solve([self.cases.case(u) for places in sides for u in places]))
         for (n, _), places in zip(asked, sides, strict=True):
@@ -275,7 +270,7 @@ class _Search:
     def _sharpened(
         self, lines: list[Line], holds: list[list[bool | None]]
     ) -> list[tuple[int, int]]:
-        """New points between neighbours of which one bounds something and the other does not."""
+        """New points between neighbours where the modes differ on the sides of only one."""
         new = []
         for n, (line, own) in enumerate(zip(lines, holds, strict=True)):
             added = 0
@@ -298,7 +293,7 @@ def _scene(case: Case) -> Scene:
 
 
 def _loose(kept: list[Line], met: list[Met]) -> list[Array]:
-    """The ends of curves that lead nowhere."""
+    """The loose ends of curves."""
     ends = [(line.corners[0] in met, line.corners[-1] in met) for line in kept]
     return [kept[n].points[k].u for n, k in loose_ends([line.places for line in kept], ends)]
 
@@ -313,7 +308,7 @@ def _explained(crossing: Crossing, lines: Iterable[Line]) -> bool:
 
 
 def _known(kind: str, points: Sequence[At[Value]], lines: Iterable[Line]) -> bool:
-    """Whether a curve has been followed before: its middle lies on one of the same kind."""
+    """Whether a curve is known: its middle lies on one of the same kind."""
     middle = points[len(points) // 2].u
     return any(line.kind == kind and distance(middle, line.places) < SAME_CURVE for line in lines)
 

@@ -28,7 +28,7 @@ DIFFERENCE = 1e-5  # of p and gamma
 SHOT = 1e-13  # last change of a frame
 CONVERGED = 1e-11  # change of x
 NEAR = 1e-4  # likewise
-LARGEST = 0.5  # of x: what lies farther is something else
+LARGEST = 0.5  # of x: a centre farther away is another one
 MOST = 12
 
 
@@ -55,7 +55,7 @@ class Centre(NamedTuple):
 
 @njit(cache=True)
 def _shoot(piece, h, rest, frames, p, gamma, iterations, tolerance):
-    """Newton's method for the frames alone, in place; mesh points, G and G_x."""
+    """Newton's method for the frames only, in place; mesh points, G and G_x."""
     n, m = rest.shape
     n_p = p.size
     nodes, places = np.empty((n + 1, 4)), np.empty((n + 1, 3))
@@ -86,16 +86,8 @@ def _shoot(piece, h, rest, frames, p, gamma, iterations, tolerance):
 def shot(system: Collocation, mesh: Mesh, frames: Array, x: Array) -> Shot:
     """The rod shot with p and gamma, from frames nearby."""
     frames = frames.copy()
-    ok, nodes, places, missed, rates = _shoot(
-        system.sector.piece,
-        mesh.h,
-        mesh.rest,
-        frames,
-        x[:-1].copy(),
-        x[-1],
-        12,
-        SHOT,
-    )
+    piece, p = system.sector.piece, x[:-1].copy()
+    ok, nodes, places, missed, rates = _shoot(piece, mesh.h, mesh.rest, frames, p, x[-1], 12, SHOT)
     return Shot(frames, nodes, places, missed, rates, ok and bool(np.isfinite(rates).all()))
 
 

@@ -1,4 +1,4 @@
-"""What holds on a boundary between folding modes, as a function of the ring and its section.
+"""Conditions that hold on boundaries between folding modes, by ring and section.
 
     stability        the folded state at gamma = pi has dM/dgamma = 0
     foldability      the fold at which the path turns back lies at gamma = pi
@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ PROBE = 1e-3  # of s: first step of a secant
 BULGE = 1e-2  # of s: for a third derivative
 SMALL = 1e-10  # of s: a secant step that has converged
 FOLDED = 0.02  # M of a state that is about the folded one; its gamma less pi is less than the cube
-FARTHEST = 0.5  # of s: what lies farther is another state
+FARTHEST = 0.5  # of s: a state farther away is another one
 MOST = 20
 
 
@@ -54,7 +53,7 @@ class Value(NamedTuple):
     system: Collocation
     psi: Array | None = None  # of an exchange, see `branch_exchange`: its state has no tangent
     bend: Array | None = None  # likewise
-    way: Array | None = None  # of an infinite slope, see `infinite_slope`: across the boundary
+    way: Array | None = None  # of an infinite slope, see `infinite_slope`: direction across it
     place: Array | None = None  # likewise: on the boundary, of which the state is
 
 
@@ -149,7 +148,7 @@ def infinite_slope(scene: Scene, seed: Value) -> Value:
     """Dgamma/ds where M = 0; the seed is a folded state.
 
     Gamma less pi is odd in M along the path, by the mirror image of a ring that is turned back.
-    Past this boundary the path crosses pi three times, at rest the second time only.
+    Past this boundary the path crosses pi three times, with M = 0 the second time only.
     """
     system, near = carried(scene, seed)
     found = _root(system, near, lambda at: at.moment)
@@ -178,7 +177,7 @@ def foldability(scene: Scene, seed: Value) -> Value:
 
 
 def snap_back(scene: Scene, seed: Value) -> Value:
-    """The extremum of dgamma/ds, where gamma bends from one way to the other; the seed has it.
+    """The extremum of dgamma/ds, where d2 gamma/ds2 changes sign; the seed has it.
 
     The folded state is always one, by symmetry, with `infinite_slope` as its condition: a cusp and
     its mirror image may merge in it, and end there.
@@ -190,7 +189,7 @@ def snap_back(scene: Scene, seed: Value) -> Value:
 
 
 def _not_folded(at: Solution) -> None:
-    """A fold or cusp that has merged with its mirror image has a condition of its own."""
+    """Refuse a fold or cusp that has merged with its mirror image: it has another condition."""
     if abs(at.moment) < FOLDED and abs(at.gamma - math.pi) < FOLDED**3:
         raise NotFound("it has become the folded state")
 
@@ -263,12 +262,12 @@ def _bend(system: Collocation, at: Solution) -> float:
 
 def _root(system: Collocation, at: Solution, value: Callable[[Solution], float]) -> Solution:
     """The solution along the path at which ``value`` vanishes (secant method)."""
-    now, step, way = value(at), PROBE, 0.0
+    now, step, total = value(at), PROBE, 0.0
     for _ in range(MOST):
         new = _moved(system, at, step)
-        way += step
+        total += step
         after = value(new)
-        if after == now or abs(way) > FARTHEST:
+        if after == now or abs(total) > FARTHEST:
             break
         step = -after * step / (after - now)
         at, now = new, after
@@ -278,21 +277,10 @@ def _root(system: Collocation, at: Solution, value: Callable[[Solution], float])
     raise NotFound("no such state nearby on the path")
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A kind of boundary with its condition."""
-
-    name: str
-    condition: Condition
-
-
-KINDS = {
-    name: Kind(name, condition)
-    for name, condition in (
-        ("stability", stability),
-        ("foldability", foldability),
-        ("infinite slope", infinite_slope),
-        ("snap-back", snap_back),
-        ("exchange", exchange),
-    )
+KINDS: dict[str, Condition] = {
+    "stability": stability,
+    "foldability": foldability,
+    "infinite slope": infinite_slope,
+    "snap-back": snap_back,
+    "exchange": exchange,
 }

@@ -43,8 +43,8 @@ ORDER = (
     "infinite slope",
     "stability",
     FOLD,
-)  # the first's state is the one that a corner tells of
-NEAR = 0.1  # of the square's side: a corner lies so near to its bracket
+)  # a corner has the state of the first
+NEAR = 0.1  # of the square's side: largest distance of a corner from its bracket
 BESIDE = 0.02  # of the side: a curve that ends so near to a corner on it ends there
 ASIDE = 2.5e-3  # of the side: what a chord of a curve is off at most
 SAME = 1e-6  # of the side: two corners so near are one
@@ -75,7 +75,7 @@ class Met:
 
 @dataclass
 class Line:
-    """A curve on its way to a boundary: its points, and the corners that some of them are."""
+    """A curve that may be a boundary: its points, and which of them are corners."""
 
     kind: str
     points: list[At[Value]]
@@ -93,7 +93,7 @@ class Line:
 
 
 def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
-    """Solve for all corners, and put each among the points of its curves."""
+    """Solve for all corners, and insert each into its curves."""
     found: list[Met] = []
     for one, other in combinations(sorted(lines, key=lambda line: ORDER.index(line.kind)), 2):
         for u in [meeting.place for meeting in meetings(one.places, other.places)]:
@@ -107,7 +107,7 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
                 ends = line.points[k : k + 2]
                 u = 0.5 * (ends[0].u + ends[1].u)
                 met = None
-                for at in _starts(ends, u, condition(kind)):
+                for at in chain(ends, _led(ends, u, condition(kind))):  # the expensive ones last
                     try:
                         met = _solved((kind, touched), u, (at.state,) * 2, condition, value)
                         break
@@ -130,9 +130,8 @@ def mark_corners(lines: list[Line], condition: ConditionOf) -> list[Met]:
 def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | None:
     """The corner near the crossing of two polygons, on both curves; None where there is none.
 
-    A state of either may turn into another one on its way to the corner, which is on another curve
-    then, or be lost; so those at both ends of the polygon's side are tried, and then those led
-    along it.
+    On the way to the corner a state may be lost, or become one of another curve. So the states at
+    both ends of the polygon's side are tried first, then those followed along it.
     """
     (i, _), (j, _) = nearest(u, one.places), nearest(u, other.places)
     firsts, seconds = one.points[i : i + 2], other.points[j : j + 2]
@@ -154,12 +153,6 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
         if all(nearest(met.first.u, line.places)[1] < ASIDE for line in (one, other)):
             return met
     return None
-
-
-def _starts(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Iterator[At[Value]]:
-    """Points of a curve from which one near ``u`` is sought, those that cost most last."""
-    yield from ends
-    yield from _led(ends, u, condition)
 
 
 def _led(ends: Sequence[At[Value]], u: Array, condition: Function[Value]) -> Iterator[At[Value]]:
@@ -193,7 +186,7 @@ def _once(met: Met, found: list[Met]) -> Met:
 
 
 def _separate(line: Line, condition: Function[Value]) -> None:
-    """See to it that between any two corners on a curve there is a point that is none."""
+    """Insert a point between neighbouring corners of a curve."""
     for k in range(len(line.points) - 2, -1, -1):
         if line.corners[k] is not None and line.corners[k + 1] is not None:
             a, b = line.points[k], line.points[k + 1]
@@ -234,7 +227,7 @@ def _put(line: Line, at: At[Value], corner: Met) -> None:
 
 
 def _end(line: Line, corner: Met) -> None:
-    """End a curve at a corner from where it goes back, or where the fold or cusp is gone."""
+    """End a curve at a corner from which it goes back, or behind which its state is lost."""
     k, places = line.corners.index(corner), line.places
     if not 0 < k < len(places) - 1:
         return

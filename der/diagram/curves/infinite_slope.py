@@ -10,7 +10,7 @@ infinite where m2, m3 and F1 can change at gamma = pi:
 These are three equations for m1, F2 and two parameters of the ring and its section: a curve, smooth
 also where two folded states merge and cease to exist. As a function of the parameters alone the
 folded state has a square root there; so a place beside the curve is moved onto it along a direction
-that crosses the curve, and what is given back is how far.
+that crosses the curve, and the value is the distance moved.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from der.bvp.collocation import Direction, required
 from der.bvp.gauss import Array
 from der.diagram.curves.branch_exchange import Shot, shot
 from der.diagram.curves.conditions import NotFound, Value, scaled
+from der.diagram.curves.tracing import by_differences
 from der.errors import ContinuationFailed
 from der.scene import Scene
 
@@ -32,7 +33,7 @@ DIFFERENCE = 1e-6  # of m1, F2 and the parameters
 CLOSE = 1e-3  # last change from which derivatives of before do
 CONVERGED = 1e-11
 LOOSE = 1e-6  # of a state that is exact already: where two merge its tangent is all but free
-FARTHEST = 0.1  # of the square's side: what lies farther is another place
+FARTHEST = 0.1  # of the square's side: a place farther away is another one
 MOST = 15
 WAYS = np.array([[0.0, 1.0], [1.0, 0.0]])  # to begin with
 
@@ -45,13 +46,13 @@ def is_half(seed: Value) -> bool:
 
 
 def infinite_slope_near(scene_at: SceneAt, u: Array, seed: Value) -> Value:
-    """How far a place is from the boundary, along the seed's way; the seed is a folded state.
+    """Distance of a place from the boundary along the seed's direction; the seed is folded.
 
     Parameters
     ----------
     scene_at : the scene at a place of the diagram
     u : (2,) the place
-    seed : without a way, those along either parameter are tried
+    seed : without a direction, those of the two parameters are tried
 
     Raises
     ------
@@ -67,7 +68,7 @@ def infinite_slope_near(scene_at: SceneAt, u: Array, seed: Value) -> Value:
 
 
 def across(scene_at: SceneAt, seed: Value) -> Value:
-    """The same state with the way that crosses the boundary at a right angle."""
+    """The same state with the direction that crosses the boundary at a right angle."""
     if seed.place is None or seed.way is None:
         return seed
     z = np.concatenate([seed.at.p[IN_PLANE], seed.place])
@@ -82,7 +83,7 @@ def across(scene_at: SceneAt, seed: Value) -> Value:
 
 
 def _moved_onto(scene_at: SceneAt, u: Array, seed: Value, way: Array) -> Value:
-    """Newton's method for m1, F2 and the distance along the way."""
+    """Newton's method for m1, F2 and the distance along the direction."""
 
     def left(z: Array) -> Array:
         return _left(scene_at, u + z[2] * way, seed, z[:2])[0]
@@ -121,7 +122,7 @@ def _value(scene_at: SceneAt, u: Array, seed: Value, way: Array, z: Array) -> Va
 
 
 def _left(scene_at: SceneAt, place: Array, seed: Value, planar: Array) -> tuple[Array, Shot]:
-    """What is left of the three equations, and the rod shot."""
+    """Residual of the three equations, and the rod shot."""
     system, mesh = scaled(scene_at(place), seed)
     x = np.append(np.zeros_like(seed.at.p), math.pi)
     x[IN_PLANE] = planar
@@ -133,10 +134,5 @@ def _left(scene_at: SceneAt, place: Array, seed: Value, planar: Array) -> tuple[
 
 
 def _rates(left: Callable[[Array], Array], z: Array, now: Array) -> Array:
-    """Derivatives, by differences; parameters towards the middle of the square."""
-    columns = []
-    for k in range(len(z)):
-        step = np.zeros_like(z)
-        step[k] = DIFFERENCE * (1.0 + abs(z[k])) * (-1.0 if z[k] > 0.5 else 1.0)
-        columns.append((left(z + step) - now) / step[k])
-    return np.array(columns).T
+    """Derivatives, by differences."""
+    return by_differences(left, z, now, DIFFERENCE * (1.0 + np.abs(z)))

@@ -74,7 +74,7 @@ def crossings_of(placed: Placed) -> list[Crossing]:
 
 
 def differences(a: Row, b: Row) -> list[str]:
-    """What must lie between two cases."""
+    """Kinds of boundaries that must lie between two cases."""
     if not (a.ok and b.ok):
         return []
     if a.foldable != b.foldable:

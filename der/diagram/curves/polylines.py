@@ -56,7 +56,7 @@ def meetings(one: Array, other: Array) -> Iterator[Meeting]:
 def loose_ends(
     lines: Sequence[Array], corners: Sequence[tuple[bool, bool]]
 ) -> list[tuple[int, int]]:
-    """Which lines, (n, 2) in the unit square, lead nowhere: their numbers, and 0 or -1 for the end.
+    """Loose ends of lines, (n, 2) in the unit square: number of the line, and 0 or -1 for the end.
 
     Such an end is no corner, nor on an edge of the square, nor on another line. A closed line has
     no ends.

@@ -1,9 +1,10 @@
-"""The two sides of a curve: where labels are asked for, and which of its pieces bound something."""
+"""Curve pruning: labels on the two sides of a curve, and the parts of it that are boundaries."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -18,20 +19,17 @@ SAME_CURVE = 1e-3  # of the side: above what chords leave of a curve
 CROWDED = 2e-4  # likewise: points nearer to each other than this have one pair of labels
 
 
-def asked_beside(line: Line) -> list[bool]:
-    """Beside which points labels are asked for: no corners, and not all where they are crowded."""
-    asked: list[bool] = []
+def asked_beside(line: Line) -> list[int]:
+    """Points beside which labels are solved for: no corners, and not all crowded ones."""
+    asked: list[int] = []
     last: Array | None = None
-    for at, corner in zip(line.points, line.corners, strict=True):
-        near = last is not None and float(np.linalg.norm(at.u - last)) < CROWDED
-        asked.append(corner is None and not near)
-        last = at.u if asked[-1] else None if corner is not None else last
+    for k, (at, corner) in enumerate(zip(line.points, line.corners, strict=True)):
+        if corner is not None:
+            last = None
+        elif last is None or float(np.linalg.norm(at.u - last)) >= CROWDED:
+            asked.append(k)
+            last = at.u
     return asked
-
-
-def where(true: Iterable[bool]) -> list[int]:
-    """The places of what is true."""
-    return [k for k, one in enumerate(true) if one]
 
 
 def unlike(line: Line, holds: Sequence[bool | None], apart: float) -> list[int]:
@@ -74,14 +72,14 @@ def _away(line: Line, k: int, other: Line) -> float:
 
 
 def _own(places: Array, k: int, way: Array) -> float:
-    """How far from its k-th point a curve that turns back passes again, along a way."""
+    """How far from its k-th point a curve that turns back passes again, in a direction."""
     side = np.array([places[k], places[k] + way])
     again = [*meetings(side, places[: max(k - 1, 0)]), *meetings(side, places[k + 2 :])]
     return min((float(np.linalg.norm(m.place - places[k])) for m in again), default=math.inf)
 
 
 def pieces_of(line: Line, holds: Sequence[bool | None]) -> list[Line]:
-    """A curve's pieces that bound something, to the corners at their ends.
+    """The parts of a curve that are boundaries, up to the corners at their ends.
 
     Parameters
     ----------
@@ -100,12 +98,9 @@ def pieces_of(line: Line, holds: Sequence[bool | None]) -> list[Line]:
                 for j in inside:
                     kept[j] = True
     pieces = []
-    start = None
-    for k, held in enumerate([*kept, False]):
-        if held and start is None:
-            start = k
-        elif not held and start is not None:
-            if k - start > 1:
-                pieces.append(Line(line.kind, line.points[start:k], line.corners[start:k]))
-            start = None
+    for held, places in groupby(range(len(kept)), key=kept.__getitem__):
+        start, *others = places
+        if held and others:
+            piece = slice(start, others[-1] + 1)
+            pieces.append(Line(line.kind, line.points[piece], line.corners[piece]))
     return pieces

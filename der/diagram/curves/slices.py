@@ -35,7 +35,7 @@ def joined(parts: Iterable[Boundaries]) -> Boundaries:
 
 
 class Slice(NamedTuple):
-    """A unit square of a family, and what a scan has found there."""
+    """A unit square of a family, and the scanned cases there."""
 
     family: Family
     sheet: str
@@ -93,7 +93,7 @@ class SliceCases:
         return self.family.case(self.sheet, unit)
 
     def bisected(self, crossings: list[Crossing], width: float) -> list[Crossing]:
-        """Two cases between each two, so close together, that differ likewise; in lockstep."""
+        """Closer pairs of cases that differ in the same way, all bisected at the same time."""
         while crossings and max(crossing.gap for crossing in crossings) > width:
             middles = [crossing.middle for crossing in crossings]
             rows = self.solve([self.case(middle) for middle in middles])
@@ -117,16 +117,13 @@ class SliceCases:
         left.sort(key=lambda item: tuple(item[0]))
         chain: list[tuple[Array, BoundaryPoint]] = []
         while left:
-            if chain:
-                apart = [float(np.linalg.norm(u - chain[-1][0])) for u, _ in left]
-                k = int(np.argmin(apart))
-                if apart[k] > 3.0 / self.family.coarse:
-                    yield tuple(p for _, p in chain)
-                    chain = []
-                    continue
-                chain.append(left.pop(k))
+            apart = [float(np.linalg.norm(u - chain[-1][0])) if chain else 0.0 for u, _ in left]
+            k = int(np.argmin(apart))
+            if apart[k] > 3.0 / self.family.coarse:
+                yield tuple(p for _, p in chain)
+                chain = []
             else:
-                chain.append(left.pop(0))
+                chain.append(left.pop(k))
         if chain:
             yield tuple(p for _, p in chain)
 

@@ -64,7 +64,7 @@ def corrected(f: Function[T], u: Array, state: T, *, near: float = 0.1) -> At[T]
         before = value
         u = u + change
         value, state = f(u, state)
-        # secant update along the way just gone (Broyden)
+        # secant update along the last change (Broyden)
         gradient = gradient + (value - before - gradient @ change) / (size * size) * change
     raise NotFound("no point of the curve found")
 
@@ -86,12 +86,12 @@ def _gradient(f: Function[T], u: Array, value: float, state: T) -> Array:
 
 @dataclass(frozen=True)
 class States(Generic[T]):
-    """What has to be known of the states that go along.
+    """How states are carried along a curve.
 
     Parameters
     ----------
-    fresh : called with the state of every point, may give back a better one to go on with
-    numbers : what makes up a state, which changes smoothly along a curve
+    fresh : called with the state of every point; returns it, or a better one to continue with
+    numbers : the numbers of a state, which change smoothly along a curve
     """
 
     fresh: Callable[[T], T] = lambda state: state
@@ -104,7 +104,7 @@ def trace(f: Function[T], u: Array, state: T, *, states: States[T] | None = None
     Parameters
     ----------
     f : value and state at a place, from a state nearby.
-    states : what to do with states; without, nothing
+    states : how states are carried along; None: as they are
 
     Raises
     ------
@@ -165,7 +165,7 @@ def _half(
 
 
 def _smooth(f: Function[T], states: States[T], here: At[T], new: At[T]) -> bool:
-    """Whether the state midway lies between those of two points: else they are on two curves."""
+    """Whether the state midway is between those of two points: else they are on two curves."""
     a, b = states.numbers(here.state), states.numbers(new.state)
     change = float(np.linalg.norm(b - a))
     if change <= STILL * (1.0 + float(np.linalg.norm(a))):
@@ -183,10 +183,7 @@ def _outside(u: Array) -> bool:
 
 
 def _at_edge(f: Function[T], inside: At[T], outside: Array) -> At[T] | None:
-    """The point of the curve on the edge of the square that it crosses first on its way out.
-
-    None where there is none so near as it should be.
-    """
+    """The point where the curve first crosses the edge of the square; None where none is near."""
     way = outside - inside.u
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = np.where(way > 0.0, (1.0 - inside.u) / way, -inside.u / way)
