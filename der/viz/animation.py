@@ -51,7 +51,7 @@ class Motion:
     @property
     def size(self) -> float:
         """Mean radius of the ring at its first state."""
-        return _mean_radius(self.x[0])
+        return mean_radius(self.x[0])
 
     @property
     def top(self) -> float:
@@ -201,9 +201,10 @@ def _section(path: Path, flat: Array) -> Section:
     alpha, beta = (number(path.section, name, 1.0) for name in ("alpha", "beta"))
     t = 1.0 / number(path.numerics, "a_over_t", A_OVER_T)
     h = t * number(path.section, "h_over_t", math.sqrt(beta / alpha))
-    factor = float(max(1, math.ceil(SEEN * _mean_radius(flat) / max(h, t))))
+    factor = float(max(1, math.ceil(SEEN * mean_radius(flat) / max(h, t))))
     return Section(factor * h, factor * t, factor)
 
 
-def _mean_radius(flat: Array) -> float:
+def mean_radius(flat: Array) -> float:
+    """Length of a closed polygon (N, 3) over 2 pi."""
     return float(np.linalg.norm(edges(flat), axis=1).sum()) / (2 * math.pi)

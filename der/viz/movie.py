@@ -32,18 +32,7 @@ from der.viz.animation import Motion, grips
 from der.viz.captions import captions
 from der.viz.files import checked_suffix, write
 from der.viz.palette import INK, PAIR, QUIET, STABLE, UNSTABLE
-from der.viz.plots.style import (
-    ENERGY,
-    GAMMA,
-    MOMENT,
-    draw_stretches,
-    entry,
-    label_axes,
-    legend_below,
-    mark,
-    stretch_entries,
-    zero_line,
-)
+from der.viz.plots import style
 from der.viz.resampling import in_step, one_or_two
 from der.viz.ribbon import HALF_WIDTH, projected, quadrilaterals
 from der.viz.titles import names
@@ -271,14 +260,14 @@ class MovieFigure:
         ]
 
     def _legend(self, paths: Sequence[Path], called: Sequence[str], *, two: bool) -> None:
-        handles = list(stretch_entries(*paths))
+        handles = list(style.stretch_entries(*paths))
         if two:  # curves have the colours of their rings
             handles = [one for one in handles if one.get_linestyle() != "-"]
             for one in handles:
                 one.set_color(QUIET)
             rings = zip(PAIR, called, strict=True)
-            handles = [*(entry(name, color=c, marker="o") for c, name in rings), *handles]
-        legend_below(self.figure, handles, fontsize=7.5)
+            handles = [*(style.entry(name, color=c, marker="o") for c, name in rings), *handles]
+        style.legend_below(self.figure, handles, fontsize=7.5)
 
     def pictures(self) -> Iterator[bytes]:
         """Every picture of the motion, RGBA; the ends stay for a while."""
@@ -295,20 +284,20 @@ class MovieFigure:
 
 def _draw(axes: Axes, path: Path, height: Array, colour: str | None) -> None:
     """The curve of one path; in a colour of its own where it shares the axes."""
-    draw_stretches(axes, path, height, colour)
+    style.draw_stretches(axes, path, height, colour)
     at = [point.position for point in path.points if point.kind in ("fold", "limit", "snap")]
-    look = mark("o", 3.0) | {"markeredgecolor": colour or INK}
+    look = style.mark("o", 3.0) | {"markeredgecolor": colour or INK}
     axes.plot(path.gamma[at] / math.pi, height[at], zorder=3, **look)
 
 
 def _label(curves: Sequence[Axes], *, beside: bool) -> None:
     """Labels and ticks of the axes of M and U."""
-    for axes, label in zip(curves, (MOMENT, ENERGY), strict=True):
-        label_axes(axes, GAMMA, label, fontsize=8.5)
+    for axes, label in zip(curves, (style.MOMENT, style.ENERGY), strict=True):
+        style.label_axes(axes, style.GAMMA, label, fontsize=8.5)
         axes.margins(x=0.03, y=0.1)
         axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         axes.yaxis.set_major_locator(MaxNLocator(4))
-    zero_line(curves[0])
+    style.zero_line(curves[0])
     if not beside:
         curves[0].set_xlabel("")
         curves[0].tick_params(labelbottom=False)

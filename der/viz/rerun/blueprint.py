@@ -124,18 +124,13 @@ def _series(n: int) -> rrb.Horizontal:
 
 def _states(n: int) -> rrb.StateTimelineView:
     return rrb.StateTimelineView(
-        origin="states",
-        name="stability, last event",
-        time_view=rrb.TimeAxis(view_range=_steps(n)),
+        origin="states", name="stability, last event", time_view=rrb.TimeAxis(view_range=_steps(n))
     )
 
 
 def _log_and_about() -> rrb.Horizontal:
     """The log of events, and the parameters."""
-    return rrb.Horizontal(
-        _log("events"),
-        rrb.TextDocumentView(origin="about", name="about"),
-    )
+    return rrb.Horizontal(_log("events"), rrb.TextDocumentView(origin="about", name="about"))
 
 
 def _time(n: int) -> rrb.TimePanel:
@@ -154,12 +149,7 @@ def _aside() -> tuple[rrb.BlueprintPanel, rrb.SelectionPanel]:
 
 
 def _ring_view(
-    energy: str,
-    motion: Motion,
-    *,
-    under: str = "",
-    name: str = "",
-    size: float | None = None,
+    energy: str, motion: Motion, *, under: str = "", name: str = "", size: float | None = None
 ) -> rrb.Spatial3DView:
     """The ring in the colours of one energy, the twisting axis upright.
 

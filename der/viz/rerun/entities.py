@@ -109,11 +109,7 @@ def _send_lines(sent: Entities) -> None:
 
 
 def send_strips(
-    sent: Entities,
-    entity: str,
-    strips: list[NDArray[np.float32]],
-    colour: Colour,
-    radius: float,
+    sent: Entities, entity: str, strips: list[NDArray[np.float32]], colour: Colour, radius: float
 ) -> None:
     """A line strip a step."""
     style = rr.LineStrips3D.from_fields(colors=colour, radii=radius * sent.motion.size)
@@ -143,8 +139,7 @@ def _send_grips(sent: Entities) -> None:
             f"{entity}/moment", rr.Arrows3D.from_fields(colors=VERMILION, radii=0.018 * size)
         )
         sent.run(
-            f"{entity}/moment",
-            rr.Arrows3D.columns(origins=beside - 0.5 * vectors, vectors=vectors),
+            f"{entity}/moment", rr.Arrows3D.columns(origins=beside - 0.5 * vectors, vectors=vectors)
         )
 
 

@@ -234,12 +234,6 @@ def _has_well(landscape: Landscape) -> bool:
 def _identity(path: Path, motion: Motion) -> str:
     """A recording id that depends on what is shown, and not on when."""
     digest = hashlib.sha256(about(path, motion).encode())
-    for array in (
-        motion.x,
-        motion.frames,
-        motion.gamma,
-        motion.moment,
-        motion.energy,
-    ):
+    for array in (motion.x, motion.frames, motion.gamma, motion.moment, motion.energy):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:32]
