@@ -181,6 +181,7 @@ def _entries(diagram: DiagramPicture) -> list[Any]:
     """What colours, lines and symbols mean, of those that occur."""
     sheets = [sheet for one in diagram.slices for sheet in one.sheets]
     labels = set(np.unique([sheet.labels for sheet in sheets]).tolist())
+    kinds = sorted({boundary.kind for one in diagram.slices for boundary in one.boundaries})
     handles: list[Any] = [
         Patch(facecolor=colour, edgecolor=QUIET, linewidth=0.6, label=name)
         for k, (name, colour) in enumerate(REGIONS)
