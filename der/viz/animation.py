@@ -158,7 +158,7 @@ def grips(motion: Motion, radius: float, points: int) -> Array:
 
 
 def _strains(frames: Array) -> Array:
-    """Rotation vectors (..., N, 3) [rad] from each frame to the next, in the basis of the frames."""
+    """Rotation vectors (..., N, 3) [rad] from each frame to the next, in frame components."""
     from scipy.spatial.transform import Rotation
 
     turn = frames @ np.roll(frames, -1, axis=-3).swapaxes(-1, -2)
