@@ -10,13 +10,7 @@ import numpy as np
 from der.geometry.shapes import circle
 from der.paper import canvas
 from der.paper.bars import bar
-from der.paper.cases import (
-    Case,
-    Curve,
-    at_vertices,
-    smooth,
-    solved,
-)
+from der.paper.cases import Case, Curve, at_vertices, smooth, solved
 from der.paper.snapshots import LEVEL
 from der.paper.tables import write_shapes
 from der.utils.files import FilePath

@@ -144,10 +144,7 @@ def _written(folder: FilePath, name: str, figure: Figure, table: dict[str, Array
     csv = Path(folder) / f"{name}.csv"
     rows = np.column_stack([np.ravel(column) for column in table.values()])
     header = ",".join(table)
-    write_whole(
-        csv,
-        lambda file: np.savetxt(file, rows, "%.10g", ",", header=header, comments=""),
-    )
+    write_whole(csv, lambda file: np.savetxt(file, rows, "%.10g", ",", header=header, comments=""))
     return [canvas.save(figure, Path(folder) / f"{name}.png"), csv]
 
 
@@ -193,7 +190,7 @@ def _map_figure(
         axes.plot(*mark.at, clip_on=False, **DOT)
         # to the left of the last point of the map
         away = (-7.5 if mark.at[0] == np.max(x) else 6.5, 6.5)
-        style.say(axes, mark.at, LETTERS[k], away, ha="center", fontsize=9, fontweight="bold")
+        style.annotate(axes, mark.at, LETTERS[k], away, ha="center", fontsize=9, fontweight="bold")
         left, bottom = 0.635 + 0.182 * (k % 2), 0.745 - 0.233 * (k // 2)
         _draw_shapes(figure.add_axes((left, bottom, 0.175, 0.165)), mark.ring)
         value = packing_ratio(mark.ring, MAP_POINTS)

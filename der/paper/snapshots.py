@@ -11,14 +11,7 @@ from der.geometry.ring import Ring
 from der.geometry.shapes import circle, ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.bars import Camera, Picture, bar, camera
-from der.paper.cases import (
-    Case,
-    Curve,
-    at_vertices,
-    in_words,
-    plain,
-    solved,
-)
+from der.paper.cases import Case, Curve, at_vertices, in_words, plain, solved
 from der.paper.tables import write_shapes
 from der.utils.files import FilePath
 

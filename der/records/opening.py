@@ -17,7 +17,13 @@ from der.utils import checks
 from der.utils.checks import Array
 
 KINDS = ("force", "couple")
-EVENTS = ("pass", "fold", "branch", "limit", "end")
+EVENTS = {  # as text
+    "pass": "reaches a saddle",
+    "fold": "snaps at a fold",
+    "branch": "snaps at a branch point",
+    "limit": "limit of a dead load",
+    "end": "end of the path",
+}
 ALIKE = 5e-5  # of the least work: pushes that take the same, but for overshooting a branch point
 
 
@@ -41,7 +47,7 @@ Positions = Annotated[Mapping[str, int], Entry(_positions)]
 class Instant(Checked):
     """When a push has done its work: where the ring is released, or a dead load gets away."""
 
-    event: Annotated[str, one_of(EVENTS)]
+    event: Annotated[str, one_of(tuple(EVENTS))]
     push: Number  # by how much the strut has changed its length [a], or the wrench has turned [rad]
     load: Number  # force or couple there
     work: Number  # of the actuator up to there

@@ -1,7 +1,7 @@
-"""The motion of a ring along a path: all that is shown of it, one entry a step, as arrays.
+"""The motion of a ring along a path, as arrays with one entry a step.
 
-States are those of the path, in its order; those of a snap, between two of them, are put in from
-the dynamics that the path's shapes hold.
+The states are those of the path in its order. Between the states before and after a snap are those
+of the snap's dynamics, if the shapes of the path contain them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from der.utils.checks import Array
 
 ENERGIES = ("bending", "twisting")
 A_OVER_T = 200.0  # of a ring whose record does not say
-SEEN = 0.13  # the wider side of the section, over the ring's mean radius, to be seen at all
+SEEN = 0.13  # least wider side of the drawn section, over the ring's mean radius
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """All that is shown, one entry a step of the motion."""
+    """What is shown, with one entry a step of the motion."""
 
     x: Array  # (n, N, 3) vertices
     frames: Array  # (n, N, 3, 3) material frames of the edges
@@ -51,7 +51,7 @@ class Motion:
     @property
     def size(self) -> float:
         """Mean radius of the ring at its first state."""
-        return _mean_radius(self.x[0])
+        return mean_radius(self.x[0])
 
     @property
     def top(self) -> float:
@@ -64,7 +64,7 @@ class Motion:
 
 
 def animate(path: Path, *, rest: Array | None = None) -> Motion:
-    """The motion of a path: its states, with the shapes of its snaps in between.
+    """The motion of a path: its states, with the states of its snaps between them.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def animate(path: Path, *, rest: Array | None = None) -> Motion:
 
 
 def _order(n: int, snaps: Sequence[Fall]) -> NDArray[np.int64]:
-    """Places, in the `n` states followed by all snaps, of the motion's steps."""
+    """Positions of the motion's steps in the `n` states of the path followed by all snaps."""
     after = [np.full(len(snap.x), snap.after + 0.5) for snap in snaps]
     return np.argsort(np.concatenate([np.arange(n), *after]), kind="stable")
 
@@ -138,7 +138,7 @@ def middles(x: Array) -> Array:
 
 
 def grips(motion: Motion, radius: float, points: int) -> Array:
-    """How far each grip has turned: arcs, and its own middle last, (2, n, points + 1, 3).
+    """The rotation of each grip as an arc, and its own middle last, (2, n, points + 1, 3).
 
     Parameters
     ----------
@@ -158,20 +158,12 @@ def grips(motion: Motion, radius: float, points: int) -> Array:
 
 
 def _strains(frames: Array) -> Array:
-    """Rotation vectors (..., N, 3) [rad] from each frame to the next, seen in the frames."""
+    """Rotation vectors (..., N, 3) [rad] from each frame to the next, in frame components."""
+    from scipy.spatial.transform import Rotation
+
     turn = frames @ np.roll(frames, -1, axis=-3).swapaxes(-1, -2)
-    axis = 0.5 * np.stack(
-        [
-            turn[..., 2, 1] - turn[..., 1, 2],
-            turn[..., 0, 2] - turn[..., 2, 0],
-            turn[..., 1, 0] - turn[..., 0, 1],
-        ],
-        axis=-1,
-    )
-    sine = np.linalg.norm(axis, axis=-1, keepdims=True)
-    cosine = 0.5 * (np.trace(turn, axis1=-2, axis2=-1)[..., None] - 1.0)
-    small = sine < 1e-9
-    return axis * np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
+    vectors: Array = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec()
+    return vectors.reshape(frames.shape[:-1])
 
 
 def _cells(shapes: Shapes) -> Array:
@@ -191,7 +183,7 @@ def _densities(path: Path, cell: Array, frames: Array, rest: Array) -> Array:
 
 
 def number(entries: Mapping[str, object], name: str, default: float) -> float:
-    """A number of a record's mapping, or what stands for one that is not there."""
+    """A number of a record's mapping, or the default."""
     value = entries.get(name)
     return float(value) if isinstance(value, int | float) else default
 
@@ -201,9 +193,10 @@ def _section(path: Path, flat: Array) -> Section:
     alpha, beta = (number(path.section, name, 1.0) for name in ("alpha", "beta"))
     t = 1.0 / number(path.numerics, "a_over_t", A_OVER_T)
     h = t * number(path.section, "h_over_t", math.sqrt(beta / alpha))
-    factor = float(max(1, math.ceil(SEEN * _mean_radius(flat) / max(h, t))))
+    factor = float(max(1, math.ceil(SEEN * mean_radius(flat) / max(h, t))))
     return Section(factor * h, factor * t, factor)
 
 
-def _mean_radius(flat: Array) -> float:
+def mean_radius(flat: Array) -> float:
+    """Length of a closed polygon (N, 3) over 2 pi."""
     return float(np.linalg.norm(edges(flat), axis=1).sum()) / (2 * math.pi)

@@ -1,4 +1,4 @@
-"""The curve of a path as it is drawn: smooth through all states, in stretches of one stability."""
+"""The drawn curve of a path: smooth through all states, in stretches of one stability."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from der.records.path import Path
 from der.utils.checks import Array
 
-SNAP = "snap"  # a stretch between two equilibria that no equilibria join
+SNAP = "snap"  # a stretch between two equilibria without equilibria between them
 
 
 def stretches(path: Path, height: Array) -> Iterator[tuple[bool | str | None, Array]]:
@@ -29,10 +29,10 @@ def stretches(path: Path, height: Array) -> Iterator[tuple[bool | str | None, Ar
 def smooth(path: Path, height: Array, per: int = 16) -> Array:
     """Return `per` points an interval on a smooth curve (gamma/pi, height) through all states.
 
-    The natural cubic spline of the chord length along (gamma, M), which turns with the path through
-    folds; on circles it is within 0.3% of the range of the true path, monotone cubics within 0.4%.
-    Snaps are straight lines, but for the moment of a ring that snaps under a dead one: that is
-    level, and ends at the ring's own where it meets a stop.
+    The curve is the natural cubic spline over the chord length along (gamma, M), which can turn
+    back at folds. On circles it is within 0.3% of the range of the true path; monotone cubics are
+    within 0.4%. Snaps are straight lines. The moment of a ring that snaps under a dead moment stays
+    constant until the ring meets a stop, and then takes the ring's own value.
     """
     values = np.column_stack([path.gamma / math.pi, height])
     place = np.arange(per * (len(path) - 1) + 1) / per
@@ -41,7 +41,7 @@ def smooth(path: Path, height: Array, per: int = 16) -> Array:
     for first, last in pieces(path):
         piece = slice(first, last + 1)
         inside = slice(first * per, last * per + 1)
-        curve[inside] = _spline(chord[piece], values[piece], place[inside] - first)
+        curve[inside] = spline(chord[piece], values[piece], place[inside] - first)
     if path.numerics.get("control") == "moment" and np.array_equal(height, path.moment):
         for k in _snaps(path):
             inside = slice((k - 1) * per, k * per)
@@ -53,10 +53,8 @@ def smooth(path: Path, height: Array, per: int = 16) -> Array:
 def sides(path: Path) -> list[bool | str | None]:
     """Whether each interval between neighbouring states is stable; None where nothing is known.
 
-    An interval that the ring snaps over is SNAP.
-
-    A state of unknown index, as special points are, leaves the intervals beside it to its
-    neighbours: the style changes there.
+    An interval over which the ring snaps is SNAP. Special points have no index: the intervals
+    beside them take the stability of their other ends, so the style changes there.
     """
     known: list[bool | str | None] = [None if i is None else i == 0 for i in path.index.tolist()]
     if len(known) == 1:
@@ -72,30 +70,27 @@ def sides(path: Path) -> list[bool | str | None]:
 
 
 def _snaps(path: Path) -> list[int]:
-    """Positions of the states in which snaps have landed."""
+    """Positions of the end states of snaps."""
     return [point.position for point in path.points if point.kind == "snap" and point.position]
 
 
 def pieces(path: Path) -> list[tuple[int, int]]:
-    """First and last states of the smooth pieces: cut at snaps, and where gamma is turned back."""
+    """First and last states of the smooth pieces, between snaps and reversals of gamma."""
     landed = _snaps(path)
     steps = np.diff(np.column_stack([path.gamma, path.moment]), axis=0)
-    turned = [
-        k
-        for k in range(1, len(path) - 1)
-        if np.dot(steps[k - 1], steps[k])
-        < -0.9 * np.prod(np.linalg.norm(steps[k - 1 : k + 1], axis=1))
-    ]
+    size = np.linalg.norm(steps, axis=1)
+    turns = np.sum(steps[:-1] * steps[1:], axis=1) < -0.9 * size[:-1] * size[1:]
+    turned = (1 + np.flatnonzero(turns)).tolist()
     starts = sorted({0, *landed, *turned})
     lasts = [k - 1 if k in landed else k for k in starts[1:]] + [len(path) - 1]
     return list(zip(starts, lasts, strict=True))
 
 
-def _spline(chord: Array, values: Array, place: Array) -> Array:
-    """Natural cubic spline of one piece, at places counted in states."""
+def spline(chord: Array, values: Array, place: Array) -> Array:
+    """Natural cubic spline of rows (n, m) over the chord, at places counted in rows."""
     from scipy.interpolate import CubicSpline
 
-    is_new = np.append(True, np.diff(chord) > 1e-5)  # neighbours in the same place make no slope
+    is_new = np.append(True, np.diff(chord) > 1e-5)  # equal neighbours give no slope
     if np.count_nonzero(is_new) == 1:
         return np.repeat(values[:1], len(place), axis=0)
     at = np.interp(place, np.arange(len(chord)), chord)
@@ -105,5 +100,20 @@ def _spline(chord: Array, values: Array, place: Array) -> Array:
 
 def chord_length(path: Path) -> Array:
     """Return the chord length along (gamma, M), each over its range, up to every state."""
-    step = [np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (path.gamma, path.moment)]
-    return np.append(0.0, np.cumsum(np.hypot(*step)))
+    spans = [float(np.ptp(v)) or 1.0 for v in (path.gamma, path.moment)]
+    return arc_length(np.column_stack([path.gamma, path.moment]) / spans)
+
+
+def arc_length(points: Array) -> Array:
+    """Length (n,) of a polygon through points (n, ...) up to each of them."""
+    steps = np.diff(points.reshape(len(points), -1), axis=0)
+    return np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
+
+
+def evenly(length: Array, n: int, keep: int | None = None) -> list[int]:
+    """Positions of ``n`` points spread evenly over a length (m,); ``keep`` is one of them."""
+    even = np.linspace(0.0, length[-1], n)
+    chosen = np.argmin(np.abs(length - even[:, None]), axis=1)
+    if keep is not None and keep not in chosen:
+        chosen[1 + np.argmin(np.abs(length[chosen[1:-1]] - length[keep]))] = keep
+    return sorted(set(chosen.tolist()))

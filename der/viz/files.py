@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path as File
 from typing import BinaryIO
 
@@ -32,8 +33,15 @@ def write(kind: str, file: FilePath, content: bytes | Callable[[BinaryIO], objec
         If it cannot be written.
     """
     put = content if callable(content) else lambda opened: opened.write(content)
-    try:
+    with refused(kind, file):
         write_whole(file, put)
+
+
+@contextmanager
+def refused(kind: str, file: FilePath) -> Iterator[None]:
+    """Give an error of the system, while a file is written, as a ValueError that names the file."""
+    try:
+        yield
     except OSError as problem:
         reason = problem.strerror or problem
         raise ValueError(f"{kind} {str(file)!r} cannot be written: {reason}") from problem

@@ -1,7 +1,7 @@
-"""A path as one page that any browser opens, offline: the ring turns, a slider moves it.
+"""A path as one page that any browser opens offline: the ring turns, a slider moves it.
 
-plotly draws. The page carries plotly's code and all states as packed numbers. `html_page.js`, which
-is put into the page, moves the ring, the dots and the captions.
+plotly draws. The page contains plotly's code and all states as packed numbers. `html_page.js` is
+part of the page; it moves the ring, the dots and the captions.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import html
 import importlib.util
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -35,14 +35,35 @@ FRAMES = 160  # steps of the slider, special points besides
 POINTER, ARC = 0.42, 13  # length of a grip's arrow over the mean radius; points on its arc
 REACH = 1.3  # half the length of the twisting axis, over the farthest point along it
 AXES = {"moment": {"xaxis": "x", "yaxis": "y"}, "energy": {"xaxis": "x2", "yaxis": "y2"}}
-LEGEND = {
-    "orientation": "h",
-    "x": 1.0,
-    "xanchor": "right",
-    "y": -0.09,
-    "yanchor": "top",
-    "font": {"size": 11},
+LEGEND = {"orientation": "h", "x": 1.0, "xanchor": "right", "y": -0.09, "yanchor": "top"}
+QUIETLY = {"showlegend": False, "hoverinfo": "skip"}  # traces without entry and without labels
+LOOK = {  # of the figure
+    "margin": {"l": 10, "r": 16, "t": 8, "b": 46},
+    "paper_bgcolor": "white",
+    "plot_bgcolor": "white",
+    "font": {"family": "system-ui, sans-serif", "color": INK},
+    "legend": LEGEND | {"font": {"size": 11}},
+    "uirevision": "keep",
+    "hovermode": "closest",
 }
+MESH = {  # the look of the ribbon
+    "type": "mesh3d",
+    "name": "ring",
+    "hoverinfo": "skip",
+    "cmin": 0.0,
+    "colorscale": [[n / 8, f"rgb{tuple(shade)}"] for n, shade in enumerate(VIRIDIS.tolist())],
+    "lighting": {"ambient": 0.62, "diffuse": 0.6, "specular": 0.15, "roughness": 0.6},
+    "lightposition": {"x": 3000, "y": -1500, "z": 4000},
+}
+BAR = {  # the look of the colour bar
+    "title": {"text": "energy per length, GJ/a²", "side": "right", "font": {"size": 11}},
+    "thickness": 9,
+    "len": 0.55,
+    "outlinewidth": 0,
+    "tickfont": {"size": 10},
+}
+SAID = {"numbers": "numbers", "stability": "line", "stable": "stable", "events": "event"}
+_SCENES = ("scene", "scene2")  # plotly's names of the views of the rings
 EYE = {"x": 1.14, "y": 0.64, "z": 0.48}
 
 
@@ -66,7 +87,7 @@ def save_html(path: Path | Sequence[Path], file: FilePath, *, frames: int = FRAM
 
 
 def check_html(file: FilePath) -> None:
-    """Refuse, before anything is solved, a file that no page can be written to."""
+    """Refuse a file to which no page can be written; called before solving."""
     checked_suffix("html", file, [SUFFIX])
     if importlib.util.find_spec("plotly") is None:
         raise ValueError(
@@ -82,50 +103,42 @@ def page(path: Path | Sequence[Path], *, frames: int = FRAMES) -> str:
     paths = one_or_two(path)
     motions = in_step(paths, frames)
     colours = PAIR if len(paths) == 2 else (INK,)
-    rings = [
-        _ring(path, motion, name, colour)
-        for path, motion, name, colour in zip(paths, motions, names(paths), colours, strict=True)
-    ]
+    rings = list(map(_ring, paths, motions, names(paths), colours))
     data = {"figure": _figure(paths, motions, colours), "rings": rings}
     head, body = "ring-origami: " + " and ".join(names(paths)), files("der.viz") / "html_page.html"
-    texts = [about(path, motion) for path, motion in zip(paths, motions, strict=True)]
     parts = {
         "TITLE": html.escape(head),
         "DATA": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
-        "ABOUT": html.escape("\n\n".join(texts)),
+        "ABOUT": html.escape("\n\n".join(map(about, paths, motions))),
         "PLAYER": (files("der.viz") / "html_page.js").read_text(encoding="utf-8"),
         "PLOTLY": get_plotlyjs(),
     }
     text = body.read_text(encoding="utf-8")
-    for name, part in parts.items():  # plotly's code last: it may hold any text
+    for name, part in parts.items():  # plotly's code last: it may contain any text
         text = text.replace(f"%{name}%", part)
     return text
 
 
 def packed(values: ArrayLike, kind: str = "f4") -> str:
-    """Numbers as base64 of little-endian float32 (or another kind); NaN stays NaN."""
+    """Numbers as base64 of little-endian float32 (or another kind); NaN is kept."""
     return base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()
 
 
 def _ring(path: Path, motion: Motion, name: str, colour: str) -> dict[str, Any]:
-    """All that changes from step to step."""
+    """What changes from step to step."""
     positions, _ = ribbon(motion.x, motion.frames, motion.section)
     said = captions(path, motion)
     return {
         "name": name,
         "colour": colour,
         "sections": motion.x.shape[1],
-        "positions": packed(positions[:, ::2]),  # each corner is there twice, once for either face
+        "positions": packed(positions[:, ::2]),  # each corner occurs twice, once for each face
         "grips": packed(np.moveaxis(grips(motion, POINTER, ARC), 0, 1)),
         "arc": ARC + 1,
         "density": packed(motion.density.sum(axis=0)),
         "gamma": packed(motion.gamma / math.pi, "f8"),
-        "moment": packed(motion.moment, "f8"),
-        "energy": packed(motion.energy, "f8"),
-        "numbers": [one.numbers for one in said],
-        "stability": [one.line for one in said],
-        "stable": [one.stable for one in said],
-        "events": [one.event for one in said],
+        **{value: packed(getattr(motion, value), "f8") for value in AXES},
+        **{key: [getattr(one, text) for one in said] for key, text in SAID.items()},
         "marks": sorted({motion.step_of(point.position) for point in path.points}),
     }
 
@@ -136,112 +149,94 @@ def _ring(path: Path, motion: Motion, name: str, colour: str) -> dict[str, Any]:
 def _figure(
     paths: Sequence[Path], motions: Sequence[Motion], colours: Sequence[str]
 ) -> dict[str, Any]:
-    """plotly's figure: what moves are meshes and grips, which come first, and dots, last."""
+    """plotly's figure. What moves: the meshes and the grips, first; the dots, last."""
     two = len(paths) == 2
-    traces = [_mesh(motion, k, motions) for k, motion in enumerate(motions)]
+    top = max(float(one.density[:, one.position >= 0].sum(axis=0).max()) for one in motions) or 1.0
+    traces = [_mesh(motion, k, top, two=two) for k, motion in enumerate(motions)]
     traces += [_line(k, INK, 5.0, [0.0], "grips") for k in range(len(motions))]
     for k, motion in enumerate(motions):
         end = REACH * float(np.abs(motion.x[..., 2]).max())
         traces.append(_line(k, QUIET, 1.5, [-end, end], "twisting axis"))
-    for name in AXES:
+    for name, axes in AXES.items():
         for path, colour, called in zip(paths, colours, names(paths), strict=True):
-            own = colour if two else None
-            label = called if two else ""
-            drawn = _curve(path, name, own, label, legend=name == "moment")
-            traces += [trace | AXES[name] for trace in drawn]
-    for name in AXES:
+            drawn = _curve(path, name, colour if two else None, called if two else "")
+            traces += [trace | axes for trace in drawn]
+    for name, axes in AXES.items():
         for colour in colours:
-            marker = {"size": 13, "color": colour, "line": {"color": "white", "width": 2}}
-            dot: dict[str, Any] = {"type": "scatter", "mode": "markers", "marker": marker}
-            dot |= {"x": [0.0], "y": [0.0], "name": f"present {name}", "cliponaxis": False}
-            traces.append(dot | {"showlegend": False, "hoverinfo": "skip"} | AXES[name])
+            dot = _marks([0.0], [0.0], 13, color=colour, line={"color": "white", "width": 2})
+            traces.append(dot | axes | QUIETLY | {"name": f"present {name}", "cliponaxis": False})
     return {"data": traces, "layout": _layout(paths, motions)}
 
 
-def _mesh(motion: Motion, k: int, motions: Sequence[Motion]) -> dict[str, Any]:
-    """The ribbon, coloured by its energy; vertices are put in by the page."""
-    i, j, m = triangles(motion.x.shape[1]).T
-    shades = [[n / 8, f"rgb{tuple(int(v) for v in c)}"] for n, c in enumerate(VIRIDIS)]
-    bar = {
-        "title": {"text": "energy per length, GJ/a²", "side": "right", "font": {"size": 11}},
-        "thickness": 9,
-        "len": 0.55,
-        "x": 0.0 if len(motions) == 1 else 0.487,
-        "xanchor": "left" if len(motions) == 1 else "center",
-        "outlinewidth": 0,
-        "tickfont": {"size": 10},
-    }
-    if len(motions) == 2:
-        bar["y"] = 0.72
-    return {
-        "type": "mesh3d",
-        "scene": "scene" if k == 0 else "scene2",
-        **{name: v.tolist() for name, v in (("i", i), ("j", j), ("k", m))},
-        "x": [0.0] * (8 * motion.x.shape[1]),
-        "y": [0.0] * (8 * motion.x.shape[1]),
-        "z": [0.0] * (8 * motion.x.shape[1]),
-        "intensity": [0.0] * (8 * motion.x.shape[1]),
-        "cmin": 0.0,
-        "cmax": max(float(one.density[:, one.position >= 0].sum(axis=0).max()) for one in motions)
-        or 1.0,
-        "colorscale": shades,
-        "showscale": k == 0,
-        "colorbar": bar,
-        "hoverinfo": "skip",
-        "lighting": {"ambient": 0.62, "diffuse": 0.6, "specular": 0.15, "roughness": 0.6},
-        "lightposition": {"x": 3000, "y": -1500, "z": 4000},
-        "name": "ring",
-    }
+def _mesh(motion: Motion, k: int, top: float, *, two: bool) -> dict[str, Any]:
+    """The ribbon, coloured by its energy up to ``top``; the page sets its vertices."""
+    n_v = motion.x.shape[1]
+    place = {"x": 0.487, "xanchor": "center", "y": 0.72} if two else {"x": 0.0, "xanchor": "left"}
+    faces = dict(zip("ijk", triangles(n_v).T.tolist(), strict=True))
+    vertices = dict.fromkeys(("x", "y", "z", "intensity"), [0.0] * (8 * n_v))
+    bar = {"cmax": top, "showscale": k == 0, "colorbar": BAR | place}
+    return MESH | faces | vertices | bar | {"scene": _SCENES[k]}
 
 
 def _line(k: int, colour: str, width: float, z: list[float], name: str) -> dict[str, Any]:
-    """A line along the twisting axis, or one that the page puts somewhere else."""
+    """A line along the twisting axis, or one that the page places elsewhere."""
+    look = {"type": "scatter3d", "mode": "lines", "line": {"color": colour, "width": width}}
+    zeros = [0.0] * len(z)
+    return look | QUIETLY | {"x": zeros, "y": zeros, "z": z, "name": name, "scene": _SCENES[k]}
+
+
+def _marks(x: list[float], y: list[float], size: float, **marker: Any) -> dict[str, Any]:
+    """Points in the axes of a curve."""
     return {
-        "type": "scatter3d",
-        "mode": "lines",
-        "scene": "scene" if k == 0 else "scene2",
-        "x": [0.0] * len(z),
-        "y": [0.0] * len(z),
-        "z": z,
-        "line": {"color": colour, "width": width},
-        "name": name,
-        "showlegend": False,
-        "hoverinfo": "skip",
+        "type": "scatter",
+        "mode": "markers",
+        "x": x,
+        "y": y,
+        "marker": {"size": size, **marker},
     }
 
 
-def _curve(
-    path: Path, name: str, own: str | None, label: str, *, legend: bool
-) -> list[dict[str, Any]]:
-    """The curve in stretches of one stability, and its special points."""
+def _curve(path: Path, name: str, own: str | None, label: str) -> Iterator[dict[str, Any]]:
+    """The curve in stretches of one stability, and its special points.
+
+    Parameters
+    ----------
+    own, label : colour and name of the ring, where there are two.
+    """
     heights: Array = getattr(path, name)
-    traces: list[dict[str, Any]] = []
     said: set[object] = set()
     for kind, points in stretches(path, heights):
         look = STRETCHES[kind]
         text = f"{label}, {look.label}" if label else look.label
-        line = {"color": own or look.colour, "dash": look.dash, "width": 2.2, "simplify": False}
-        trace: dict[str, Any] = {"type": "scatter", "mode": "lines", "line": line, "name": text}
-        trace |= {"x": points[:, 0].tolist(), "y": points[:, 1].tolist()}
-        trace |= {"legendgroup": text, "showlegend": legend and kind not in said}
-        trace["hovertemplate"] = "γ = %{x:.4f} π<br>%{y:.4f}<extra></extra>"
-        traces.append(trace)
+        yield {
+            "type": "scatter",
+            "mode": "lines",
+            **dict(zip("xy", points.T.tolist(), strict=True)),
+            "line": {
+                "color": own or look.colour,
+                "dash": look.dash,
+                "width": 2.2,
+                "simplify": False,
+            },
+            "name": text,
+            "legendgroup": text,
+            "showlegend": name == "moment" and kind not in said,
+            "hovertemplate": "γ = %{x:.4f} π<br>%{y:.4f}<extra></extra>",
+        }
         said.add(kind)
     at = [point.position for point in path.points]
     if at:
-        marker = {"size": 7, "color": "white", "line": {"color": own or INK, "width": 1.4}}
-        kinds = [POINTS[point.kind] for point in path.points]
-        marks: dict[str, Any] = {"type": "scatter", "mode": "markers", "marker": marker}
-        marks["text"] = kinds
-        marks |= {"x": (path.gamma[at] / math.pi).tolist(), "y": heights[at].tolist()}
-        marks |= {"name": "special points", "showlegend": False}
-        marks["hovertemplate"] = "%{text}<br>γ = %{x:.6f} π<br>%{y:.6f}<extra></extra>"
-        traces.append(marks)
-    return traces
+        x, y = (path.gamma[at] / math.pi).tolist(), heights[at].tolist()
+        yield _marks(x, y, 7, color="white", line={"color": own or INK, "width": 1.4}) | {
+            "text": [POINTS[point.kind] for point in path.points],
+            "name": "special points",
+            "showlegend": False,
+            "hovertemplate": "%{text}<br>γ = %{x:.6f} π<br>%{y:.6f}<extra></extra>",
+        }
 
 
 def _range(paths: Sequence[Path], name: str) -> list[float]:
-    """Limits that hold the values of all paths, and a little more."""
+    """Limits that contain the values of all paths, with a margin."""
     values = np.concatenate([getattr(path, name) for path in paths])
     low, high = float(values.min()), float(values.max())
     room = 0.05 * ((high - low) or 1.0)
@@ -249,7 +244,7 @@ def _range(paths: Sequence[Path], name: str) -> list[float]:
 
 
 def _layout(paths: Sequence[Path], motions: Sequence[Motion]) -> dict[str, Any]:
-    """Where the views lie, and in which limits: these never change."""
+    """Places and limits of the views, which never change."""
     if len(motions) == 2:
         domains = {"scene": ([0.0, 0.48], [0.42, 1.0]), "scene2": ([0.52, 1.0], [0.42, 1.0])}
         (mx, my), (ux, uy) = ([0.05, 0.47], [0.0, 0.36]), ([0.56, 1.0], [0.0, 0.36])
@@ -266,18 +261,11 @@ def _layout(paths: Sequence[Path], motions: Sequence[Motion]) -> dict[str, Any]:
         "yaxis": _axis("moment M a/GJ", domain=my, anchor="x", range=moments),
         "xaxis2": _axis(turned, domain=ux, anchor="y2", matches="x"),
         "yaxis2": _axis("energy U a/GJ", domain=uy, anchor="x2", range=energies),
-        "margin": {"l": 10, "r": 16, "t": 8, "b": 46},
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
-        "font": {"family": "system-ui, sans-serif", "color": INK},
-        "legend": LEGEND,
-        "uirevision": "keep",
-        "hovermode": "closest",
-    }
+    } | LOOK
 
 
 def _scene(motions: Sequence[Motion]) -> dict[str, Any]:
-    """The view of a ring, in limits that hold it at all times."""
+    """The view of a ring, in limits that contain it at all times."""
     reach = max(float(np.abs(motion.x).max()) + 0.6 * motion.section.h for motion in motions)
     side = {"range": [-reach, reach], "visible": False}
     return {

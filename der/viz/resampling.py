@@ -1,14 +1,15 @@
 """Animations resampled to even motion, and two of them in step.
 
-A path has few states, close together where it bends: good for reading, not for watching. Here a
-motion is resampled in steps of about equal motion. Between two equilibria the ring is drawn on a
-spline through its states (as the curves are, see `curve`), within snaps on a straight line.
+A path has few states, which are dense where its curvature is large. An animation needs steps of
+about equal motion. Between two equilibria the ring is drawn on a spline through its states, as the
+curves are (see `curve`). Within snaps it is drawn on straight lines.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 from der.records.path import Path
 from der.utils.checks import Array
 from der.viz.animation import Motion, animate
-from der.viz.curve import chord_length, pieces, smooth
+from der.viz.curve import chord_length, pieces, smooth, spline
+from der.viz.ribbon import unit
 
-PER = 16  # points of the drawn curve in an interval: the present state moves on these
-FINE = 240  # steps of each of two motions before they are brought in step
+PER = 16  # points of the drawn curve in an interval; the present state moves on them
+FINE = 240  # steps of each of two motions before they are aligned
 _ROUND = 1e-9
 
 
@@ -44,9 +46,9 @@ def one_or_two(path: Path | Sequence[Path]) -> list[Path]:
 
 
 def in_step(paths: Sequence[Path], n: int) -> list[Motion]:
-    """Films of one or two paths in about ``n`` common steps, at equal gamma wherever there are any.
+    """Motions of one or two paths in about ``n`` common steps, at equal gamma where that exists.
 
-    Where one ring turns back in gamma or snaps, the other waits.
+    Where the gamma of one ring turns back, or the ring snaps, the other one waits.
 
     Raises
     ------
@@ -57,29 +59,23 @@ def in_step(paths: Sequence[Path], n: int) -> list[Motion]:
         raise ValueError(f"frames must be at least 2, got {n!r}")
     if len(paths) == 1:
         return [resampled(paths[0], n)]
-    motions = [animate(path) for path in paths]
+    motions = list(map(animate, paths))
     fine = [_even(path, motion, FINE) for path, motion in zip(paths, motions, strict=True)]
-    gamma = [
-        between(path, motion, at).gamma
-        for path, motion, at in zip(paths, motions, fine, strict=True)
-    ]
+    gamma = [motion.gamma for motion in map(between, paths, motions, fine)]
     pairs = aligned(*gamma)
-    chosen = set(np.linspace(0, len(pairs) - 1, n).round().astype(int).tolist())
-    for k, (path, motion) in enumerate(zip(paths, motions, strict=True)):
-        for step in _kept(path, motion):
-            chosen.add(int(np.searchsorted(fine[k][pairs[:, k]], step - _ROUND)))
-    rows = pairs[sorted(chosen)]
-    return [
-        between(path, motion, fine[k][rows[:, k]])
-        for k, (path, motion) in enumerate(zip(paths, motions, strict=True))
-    ]
+    at = [places[chosen] for places, chosen in zip(fine, pairs.T, strict=True)]
+    rows = np.linspace(0, len(pairs) - 1, n).round().astype(int)
+    for path, motion, places in zip(paths, motions, at, strict=True):
+        rows = np.append(rows, np.searchsorted(places, np.subtract(_kept(path, motion), _ROUND)))
+    rows = np.unique(rows)
+    return list(map(between, paths, motions, [places[rows] for places in at]))
 
 
 def aligned(one: Array, other: Array) -> NDArray[np.int64]:
-    """Pairs (k, 2) of places in two sequences, each running forwards, as near as can be throughout.
+    """Pairs (k, 2) of places in two sequences, ascending in both, with the closest values.
 
-    The least sum of differences, by dynamic programming (time warping); of equal ways the one on
-    which both go on.
+    They have the least sum of differences, by dynamic programming (time warping). Of equal sums,
+    the one is taken in which both sequences advance.
     """
     n, m = len(one), len(other)
     apart = np.abs(one[:, None] - other) + 1e-9
@@ -103,7 +99,7 @@ def between(path: Path, motion: Motion, places: Array) -> Motion:
     Parameters
     ----------
     places : (m,) ascending; 2.5 is in the middle between the steps 2 and 3. Where a snap has no
-        history there is nothing between the two: the ring is shown before or after it.
+        history, the ring is shown before or after it.
     """
     last = len(motion.x) - 1
     at = np.clip(np.asarray(places, dtype=float), 0.0, last)
@@ -116,19 +112,17 @@ def between(path: Path, motion: Motion, places: Array) -> Motion:
     snapping = (motion.position[k] < 0) | (motion.position[np.minimum(k + 1, last)] < 0)
     n, n_v, _ = motion.x.shape
     density = np.moveaxis(motion.density, 0, -1)
-    flat = np.concatenate(
-        [motion.x, motion.frames.reshape(n, n_v, 9), density], axis=2
-    )  # all that is drawn of a vertex
-    drawn = _splined(path, motion, flat.reshape(n, -1), at).reshape(len(at), n_v, -1)
+    drawn = np.concatenate([motion.x, motion.frames.reshape(n, n_v, 9), density], axis=2)
+    drawn = _splined(path, motion, drawn.reshape(n, -1), at).reshape(len(at), n_v, -1)
     share = at - k
     position = motion.position[np.where(share == 1.0, np.minimum(k + 1, last), k)]
-    inside = snapping & (position < 0) | snapping & (share > 0.0) & (share < 1.0)
+    inside = snapping & ((position < 0) | (share > 0.0) & (share < 1.0))
+    names = ("gamma", "moment", "energy")
+    values: dict[str, Any] = {name: _on_curve(path, motion, name, at, inside) for name in names}
     return replace(
         motion,
+        **values,
         x=drawn[..., :3],
-        gamma=_on_curve(path, motion, "gamma", at, inside),
-        moment=_on_curve(path, motion, "moment", at, inside),
-        energy=_on_curve(path, motion, "energy", at, inside),
         frames=_orthonormal(drawn[..., 3:12].reshape(len(at), n_v, 3, 3)),
         position=np.where(inside, -1, position),
         density=np.moveaxis(np.maximum(drawn[..., 12:], 0.0), -1, 0),
@@ -139,29 +133,28 @@ def between(path: Path, motion: Motion, places: Array) -> Motion:
 
 
 def _even(path: Path, motion: Motion, n: int) -> Array:
-    """Places in steps of equal motion, half of the ring and half of its grips."""
+    """Places in steps of equal motion; the motion is half that of the ring, half that of grips."""
     if len(motion.x) == 1:
         return np.zeros(1)
     moved = np.linalg.norm(np.diff(motion.x, axis=0), axis=2).max(axis=1)
     turned = np.abs(np.diff(motion.gamma))
-    shares = [np.append(0.0, np.cumsum(v)) / (float(v.sum()) or 1.0) for v in (moved, turned)]
-    way = shares[0] + shares[1]
-    steps = np.arange(len(motion.x))
-    rising = np.append(True, np.diff(way) > 0.0)
-    places = np.interp(np.linspace(0.0, way[-1], n), way[rising], steps[rising])
+    steps = moved / (float(moved.sum()) or 1.0) + turned / (float(turned.sum()) or 1.0)
+    length = np.append(0.0, np.cumsum(steps))
+    rising = np.flatnonzero(np.append(True, steps > 0.0))
+    places = np.interp(np.linspace(0.0, length[-1], n), length[rising], rising)
     return np.unique(np.concatenate([places, _kept(path, motion)]))
 
 
 def _kept(path: Path, motion: Motion) -> list[float]:
-    """Steps that are always shown: special points, and the last."""
+    """Steps that are always shown: special points and the last one."""
     return [*(float(motion.step_of(p.position)) for p in path.points), len(motion.x) - 1.0]
 
 
 def _on_curve(path: Path, motion: Motion, name: str, at: Array, inside: Array) -> Array:
-    """Values at places of the motion: on the curve as it is drawn, within snaps on their own."""
+    """Values at places of the motion: on the drawn curve; within snaps those of the snap."""
     steps = np.arange(len(motion.x))
     known = motion.position >= 0
-    # a place in the path: the steps of a snap have none, theirs is that of the state they leave
+    # a step of a snap has no place in the path: it gets that of the state before the snap
     place = np.interp(at, steps[known], motion.position[known].astype(float))
     if len(path) == 1:
         values = np.repeat(getattr(path, name), len(at))
@@ -170,39 +163,29 @@ def _on_curve(path: Path, motion: Motion, name: str, at: Array, inside: Array) -
         curve = smooth(path, height, PER)[:, column] * (np.pi if name == "gamma" else 1.0)
         values = np.interp(place * PER, np.arange(len(curve)), curve)
     own: Array = getattr(motion, name)
-    snapping = np.interp(at, steps, np.nan_to_num(own))
-    if name == "moment":
-        snapping = np.full(len(at), np.nan)
+    snapping = np.nan if name == "moment" else np.interp(at, steps, own)
     return np.where(inside, snapping, values)
 
 
 def _splined(path: Path, motion: Motion, values: Array, at: Array) -> Array:
-    """Rows of values (n, m) at places: splines along the smooth pieces, straight within snaps."""
-    from scipy.interpolate import CubicSpline
-
+    """Rows of values (n, m) at places: splines along the smooth pieces, lines within snaps."""
     k = np.minimum(at.astype(int), max(len(values) - 2, 0))
     after = np.minimum(k + 1, len(values) - 1)
     share = (at - k)[:, None]
     out = (1.0 - share) * values[k] + share * values[after]
     if len(path) == 1:
         return out
-    length = chord_length(path)  # as of the curve: else gamma would not be that of the grips
+    length = chord_length(path)  # that of the curve, so that gamma is that of the grips
     for first, last in pieces(path):
         a, b = motion.step_of(first), motion.step_of(last)
-        chord = length[first : last + 1]
-        new = np.append(True, np.diff(chord) > 1e-5)
-        if b - a < 2 or np.count_nonzero(new) < 3:
-            continue
-        spline = CubicSpline(chord[new], values[a : b + 1][new], bc_type="natural")
-        here = (at > a) & (at < b)
-        out[here] = spline(np.interp(at[here], np.arange(a, b + 1), chord))
+        inside = (at > a) & (at < b)
+        out[inside] = spline(length[first : last + 1], values[a : b + 1], at[inside] - a)
     return out
 
 
 def _orthonormal(frames: Array) -> Array:
-    """Frames near to these, d3 kept."""
-    d3 = frames[..., 2, :] / np.linalg.norm(frames[..., 2, :], axis=-1, keepdims=True)
+    """Orthonormal frames near to these, with the same direction of d3."""
+    d3 = unit(frames[..., 2, :])
     d1 = frames[..., 0, :]
-    d1 = d1 - np.sum(d1 * d3, axis=-1, keepdims=True) * d3
-    d1 = d1 / np.linalg.norm(d1, axis=-1, keepdims=True)
+    d1 = unit(d1 - np.sum(d1 * d3, axis=-1, keepdims=True) * d3)
     return np.stack([d1, np.cross(d3, d1), d3], axis=-2)

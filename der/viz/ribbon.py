@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,30 +11,21 @@ from der.utils.checks import Array
 from der.viz.animation import Section
 
 CORNERS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])  # along d1, d2
-VIRIDIS = np.array(  # every eighth of matplotlib's viridis: even steps for all colour vision
-    [
-        (68, 1, 84),
-        (71, 44, 122),
-        (59, 81, 139),
-        (44, 113, 142),
-        (33, 144, 141),
-        (39, 173, 129),
-        (92, 200, 99),
-        (170, 220, 50),
-        (253, 231, 37),
-    ]
-)
+# every eighth of matplotlib's viridis: even steps for all colour vision
+VIRIDIS = np.frombuffer(
+    bytes.fromhex("440154 472c7a 3b518b 2c718e 21908d 27ad81 5cc863 aadc32 fde725"), np.uint8
+).reshape(-1, 3)
 
 
 def ribbon(x: Array, frames: Array, section: Section) -> tuple[Array, Array]:
     """Vertices and normals (n, 8 N, 3): each corner of a section once for either of its faces."""
     d1, d3 = (frames[..., k, :] + np.roll(frames[..., k, :], -1, axis=-2) for k in (0, 2))
-    d2 = _unit(np.cross(d3, d1))
-    d1 = _unit(np.cross(d2, d3))
+    d2 = unit(np.cross(d3, d1))
+    d1 = unit(np.cross(d2, d3))
     along = np.stack([d1, d2], axis=-2)
     corners = x[..., None, :] + (0.5 * CORNERS * (section.h, section.t)) @ along
     positions = np.repeat(corners, 2, axis=-2)
-    # neighbours in memory alike: the file is compressed
+    # in this order, equal numbers are neighbours: the file compresses better
     normals = (np.array([(s, 0.0) if k else (0.0, c) for s, c in CORNERS for k in (0, 1)])) @ along
     shape = (len(x), -1, 3)
     return positions.reshape(shape), normals.reshape(shape)
@@ -59,10 +49,11 @@ def viridis(share: Array) -> NDArray[np.uint32]:
     at = np.clip(share, 0.0, 1.0) * (len(VIRIDIS) - 1)
     nodes = np.arange(len(VIRIDIS))
     red, green, blue = (np.interp(at, nodes, v).round().astype(np.uint32) for v in VIRIDIS.T)
-    return (red << 24) | (green << 16) | (blue << 8) | np.uint32(255)
+    return np.asarray((red << 24) | (green << 16) | (blue << 8) | np.uint32(255), dtype=np.uint32)
 
 
-def _unit(vectors: Array) -> Array:
+def unit(vectors: Array) -> Array:
+    """Vectors (..., 3) scaled to unit length."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
@@ -83,10 +74,9 @@ class Camera(NamedTuple):
 
 
 def looking_from(towards: Array) -> Camera:
-    """The camera that has the twisting axis upright."""
-    towards = towards / math.sqrt(towards @ towards)
-    right = np.cross([0.0, 0.0, 1.0], towards)
-    right /= np.linalg.norm(right)
+    """The camera whose pictures have the twisting axis upright."""
+    towards = unit(towards)
+    right = unit(np.cross([0.0, 0.0, 1.0], towards))
     return Camera(towards, right, np.cross(towards, right))
 
 
@@ -120,13 +110,12 @@ def quadrilaterals(
     curve = CubicSpline(np.arange(n + 1), np.append(nodes, nodes[:1], axis=0), bc_type="periodic")
     points = curve(np.arange(ACROSS + 1) * n / ACROSS - 0.5)
     centre, across = points[:, :3], points[:, 3:]
-    across = width * across / np.linalg.norm(across, axis=1, keepdims=True)
+    across = width * unit(across)
     lines = centre + np.multiply.outer([-1.0, -0.84, 0.84, 1.0], across)  # (4, ACROSS + 1, 3)
     corners = np.stack([lines[:-1, :-1], lines[:-1, 1:], lines[1:, 1:], lines[1:, :-1]], axis=2)
 
-    normal = np.cross(np.diff(centre, axis=0), across[1:] + across[:-1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    shade = 0.62 + 0.38 * np.abs(normal @ (light / np.linalg.norm(light)))
+    normal = unit(np.cross(np.diff(centre, axis=0), across[1:] + across[:-1]))
+    shade = 0.62 + 0.38 * np.abs(normal @ unit(light))
     colour = np.where((normal @ camera.towards > 0)[:, None], FRONT, BACK)
     if grips:
         from_grip = np.abs((np.arange(ACROSS) + 0.5 + ACROSS / 4) % (ACROSS / 2) - ACROSS / 4)

@@ -420,7 +420,7 @@ def test_words_and_picture():
     found = searched()
     said = summary(found)
     assert f"{found.best.held.work:.8g}" in said
-    assert "slow force" in said
+    assert "quasi-static force" in said
     assert "dead couple" in said
     figure = draw(found)
     rings, *_ = figure.axes

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from der.records.opening import Instant, LeastPush, Push
+from der.records.opening import EVENTS, Instant, LeastPush, Push
 from der.records.text.table import count, floor, number
-
-_EVENTS = {
-    "pass": "carried to a saddle",
-    "fold": "snaps at a fold",
-    "branch": "snaps at a branch point",
-    "limit": "limit of the load",
-    "end": "end",
-}
 
 
 def lines(found: LeastPush) -> list[str]:
     """The pushes of least work, by kind, and the barriers beside them."""
     told = [f"{len(found.pushes)} pushes at pairs of {found.numerics['points']} points and between"]
-    for name, places, dead in (("slow", found.least, False), ("dead", found.least_dead, True)):
+    for name, places in (("quasi-static", found.least), ("dead", found.least_dead)):
+        dead = name == "dead"
         for kind, k in places.items():
             one = found.pushes[k]
             instant = one.dead if dead else one.held
@@ -36,8 +29,8 @@ def lines(found: LeastPush) -> list[str]:
 def _push(name: str, one: Push, at: Instant, least: float) -> str:
     places = ", ".join(f"{s:.5g}" for s in one.points)
     return (
-        f"{name + ':':13}work {at.work:.8g}, load {number(at.load, '.5g', least)} "
+        f"{name + ':':20}work {at.work:.8g}, load {number(at.load, '.5g', least)} "
         f"(largest {one.peak:.5g}), push {at.push:.5g}; s/L = {places}, {one.direction}; "
-        f"{_EVENTS[at.event]}, index {count(at.index_before)}/{count(at.index_after)}, "
+        f"{EVENTS[at.event]}, index {count(at.index_before)}/{count(at.index_after)}, "
         f"end state when released: {at.lands}"
     )

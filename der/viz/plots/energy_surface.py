@@ -13,22 +13,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FixedLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from der.records.energy_surface import Surface
 from der.utils.checks import Array
 from der.viz.palette import INK, QUIET, UNSTABLE
-from der.viz.plots.style import GAMMA, MARKS, blank, entry, label_axes, legend_below, mark
+from der.viz.plots import style
 from der.viz.titles import title
 
 YELLOW = "#F0E442"
 LEVELS = 28  # of a filled contour
-CEILING = 1.35  # of the path's largest energy: what lies above is one colour
+CEILING = 1.35  # over the path's largest energy: higher energies have one colour
 COLOURS = "YlGnBu_r"
 
 
 def draw(surface: Surface) -> Figure:
-    """Contours of the least energy over twist and grip distance, and the surface in perspective.
+    """Contours of the least energy over twist and distance, and the surface in perspective.
 
     Raises
     ------
@@ -37,24 +37,20 @@ def draw(surface: Surface) -> Figure:
     """
     if not np.any(np.isfinite(surface.energy)):
         raise ValueError("surface must have a minimum in some cell to be plotted, got none")
-    figure = blank(10.4, 4.7, title(surface))
+    figure = style.blank(10.4, 4.7, title(surface))
     ceiling = CEILING * float(np.nanmax(surface.path[:, 2]))
     norm = PowerNorm(0.7, 0.0, ceiling)
     axes = figure.add_axes((0.06, 0.175, 0.42, 0.74))
     filled = _contours(axes, surface, norm)
     handles = [*_hatches(axes, surface), *_overlay(axes, surface)]
-    label_axes(axes, GAMMA, "distance of the grips  $d/a$")
-    axes.margins(0.0)
+    style.label_axes(axes, style.GAMMA, "distance of the grips  $d/a$")
     axes.set_xlim(surface.gamma[0] / math.pi, surface.gamma[-1] / math.pi)
     axes.set_ylim(float(surface.distance[0]), float(surface.distance[-1]))
     bar = figure.colorbar(filled, cax=figure.add_axes((0.492, 0.175, 0.011, 0.74)))
-    bar.set_label("least energy  $U\\,a/GJ$", fontsize=8.5, color=INK)
-    bar.locator = FixedLocator(MaxNLocator(7).tick_values(0.0, 0.97 * ceiling)[:-1])
-    bar.update_ticks()
-    bar.ax.tick_params(labelsize=7.5, color=QUIET, labelcolor=INK)
-    bar.outline.set_visible(False)
+    ticks = MaxNLocator(7).tick_values(0.0, 0.97 * ceiling)[:-1]
+    style.dress_bar(bar, "least energy  $U\\,a/GJ$", ticks, 8.5)
     _relief(figure, surface, norm)
-    legend_below(figure, handles)
+    style.legend_below(figure, handles)
     return figure
 
 
@@ -69,17 +65,16 @@ def _contours(axes: Axes, surface: Surface, norm: PowerNorm) -> Any:
 
 def _hatches(axes: Axes, surface: Surface) -> Iterator[Patch]:
     """Hatching over cells with several minima, and dots over those of index above 0."""
-    x, y = surface.gamma / math.pi, surface.distance
+    look: dict[str, Any] = {"facecolor": "#d9ecd0", "edgecolor": QUIET, "linewidth": 0.0}
+    unstable = "unstable to modes without the symmetry"
     for chosen, hatch, label in (
         (surface.count > 1, "////", "several minima"),
-        (surface.index > 0, "....", "unstable to modes without the symmetry"),
+        (surface.index > 0, "....", unstable),
     ):
         if np.any(chosen):
-            shade = axes.contourf(
-                x, y, chosen.T.astype(float), (0.5, 1.5), colors="none", hatches=(hatch,)
-            )
+            grid = (surface.gamma / math.pi, surface.distance, chosen.T.astype(float))
+            shade = axes.contourf(*grid, (0.5, 1.5), colors="none", hatches=(hatch,))
             shade.set(edgecolor=(0.13, 0.13, 0.13, 0.35), linewidth=0.0)
-            look: dict[str, Any] = {"facecolor": "#d9ecd0", "edgecolor": QUIET, "linewidth": 0.0}
             yield Patch(hatch=hatch, label=label, **look)
 
 
@@ -89,7 +84,7 @@ def _overlay(axes: Axes, surface: Surface) -> Iterator[Line2D]:
     edge = [withStroke(linewidth=2.8, foreground="white")]
     turn, away, _ = surface.path.T
     axes.plot(turn / math.pi, away, path_effects=edge, zorder=3, **line)
-    yield entry("path of twisting", **line)
+    yield style.entry("path of twisting", **line)
     snap: dict[str, Any] = {"color": UNSTABLE, "linewidth": 1.4}
     for one in surface.snaps:
         x, y = one[:, 0] / math.pi, one[:, 1]
@@ -97,18 +92,18 @@ def _overlay(axes: Axes, surface: Surface) -> Iterator[Line2D]:
         arrow = {"arrowstyle": "-|>", **snap}
         axes.annotate("", (x[-1], y[-1]), xytext=(x[0], y[0]), arrowprops=arrow, zorder=4)
     if surface.snaps:
-        yield entry("snap", marker=">", markersize=4, **snap)
+        yield style.entry("snap", marker=">", markersize=4, **snap)
     for places, label, look in (
-        (surface.folds, "fold", mark(*MARKS["fold"])),
-        (surface.rests, "$M = 0$", mark("o", 5.0, YELLOW)),
+        (surface.folds, "fold", style.mark(*style.MARKS["fold"])),
+        (surface.rests, "$M = 0$", style.mark("o", 5.0, YELLOW)),
     ):
         if len(places):
             axes.plot(places[:, 0] / math.pi, places[:, 1], zorder=5, clip_on=False, **look)
-            yield entry(label, **look)
+            yield style.entry(label, **look)
 
 
 def _relief(figure: Figure, surface: Surface, norm: PowerNorm) -> None:
-    """The surface in perspective, cut off at the ceiling, with the path and snaps on it."""
+    """The surface in perspective up to the ceiling, with the path and snaps on it."""
     axes: Any = figure.add_axes((0.6, 0.09, 0.4, 0.9), projection="3d")
     x, y, height = _finer(surface)
     ceiling = float(norm.vmax or 1.0)
@@ -126,11 +121,9 @@ def _relief(figure: Figure, surface: Surface, norm: PowerNorm) -> None:
     axes.view_init(elev=27.0, azim=-128.0)
     axes.zaxis.set_rotate_label(False)
     axes.set_box_aspect((1.25, 1.0, 0.8), zoom=0.95)
-    for axis, label in zip(
-        (axes.xaxis, axes.yaxis, axes.zaxis),
-        ("$\\gamma/\\pi$", "$d/a$", "$U\\,a/GJ$"),
-        strict=True,
-    ):
+    labels = {"x": "$\\gamma/\\pi$", "y": "$d/a$", "z": "$U\\,a/GJ$"}
+    for name, label in labels.items():
+        axis = getattr(axes, f"{name}axis")
         axis.set_label_text(label, fontsize=8.5, color=INK)
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.line.set_color(QUIET)
@@ -140,7 +133,7 @@ def _relief(figure: Figure, surface: Surface, norm: PowerNorm) -> None:
 
 
 def _finer(surface: Surface) -> tuple[Array, Array, Array]:
-    """The grid and its energies, three times as fine, so that a cut through it is smooth."""
+    """The grid and its energies, three times as fine, so that the edge at the ceiling is smooth."""
     from scipy.interpolate import RegularGridInterpolator
 
     axes = (surface.gamma, surface.distance)

@@ -8,32 +8,18 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from der.records.landscape import Landscape, Rest
 from der.utils.checks import Array
 from der.viz.palette import INK, QUIET
-from der.viz.plots.style import (
-    ENERGY,
-    GAMMA,
-    MOMENT,
-    blank,
-    draw_stretches,
-    entry,
-    label_axes,
-    legend_below,
-    mark,
-    say,
-    stretch_entries,
-    zero_line,
-)
+from der.viz.plots import style
 from der.viz.titles import sure, title
 
-KINDS = {"well": mark("o", 5.6, INK), "saddle": mark("^", 6.6)}  # of M = 0 states
+KINDS = {"well": style.mark("o", 5.6, INK), "saddle": style.mark("^", 6.6)}  # of M = 0 states
 
 
 def draw(landscape: Landscape) -> Figure:
-    """The picture of a landscape along the path: U over M, beside U from saddle to folded ring.
+    """The picture of a landscape: U above M, and beside them U from the saddle to the folded ring.
 
     Raises
     ------
@@ -44,35 +30,39 @@ def draw(landscape: Landscape) -> Figure:
     if not len(path):
         raise ValueError("landscape must have at least one state to be plotted, got none")
     zoomed = landscape.barriers.open is not None
-    figure = blank(8.6 if zoomed else 6.0, 4.6, title(path))
+    figure = style.blank(8.6 if zoomed else 6.0, 4.6, title(path))
     left, right = (0.075, 0.5645) if zoomed else (0.105, 0.985)
-    above = figure.add_axes((left, 0.4225, right - left, 0.4925))
-    below = figure.add_axes((left, 0.165, right - left, 0.2325), sharex=above)
-    curves = ((above, path.energy, "", ENERGY), (below, path.moment, GAMMA, MOMENT))
+    ratio = 0.4925 / 0.2325
+    above, below = style.stacked(figure, ratio, left=left, right=right, bottom=0.165, top=0.915)
+    curves = (
+        (above, path.energy, "", style.ENERGY),
+        (below, path.moment, style.GAMMA, style.MOMENT),
+    )
     for axes, height, across, up in curves:
         _draw_curve(axes, landscape, height)
-        label_axes(axes, across, up)
-    zero_line(below)
-    above.tick_params(labelbottom=False)
+        style.label_axes(axes, across, up)
+    style.zero_line(below)
     _fold_barrier(above, landscape)
     if zoomed:
         _saddle_and_well(figure.add_axes((0.6405, 0.165, 0.3445, 0.75)), landscape)
     there = {rest.kind for rest in landscape.rests}
-    states = [entry(f"{kind}, $M = 0$", **look) for kind, look in KINDS.items() if kind in there]
-    legend_below(figure, [*stretch_entries(path), *states])
+    states = [
+        style.entry(f"{kind}, $M = 0$", **look) for kind, look in KINDS.items() if kind in there
+    ]
+    style.legend_below(figure, [*style.stretch_entries(path), *states])
     return figure
 
 
 def _draw_curve(axes: Axes, landscape: Landscape, height: Array) -> None:
     """Draw a curve over gamma, with the M = 0 states on it."""
-    draw_stretches(axes, landscape.path, height)
+    style.draw_stretches(axes, landscape.path, height)
     for rest in landscape.rests:
         place = (rest.gamma / math.pi, height[rest.position])
         axes.plot(*place, zorder=5, clip_on=False, **KINDS[rest.kind])
 
 
 def _fold_barrier(axes: Axes, landscape: Landscape) -> None:
-    """The height of the saddle above the flat ring, as an arrow where there is most room."""
+    """The height of the saddle above the flat ring, as an arrow; without one, the reason."""
     found = landscape.barriers
     axes.margins(x=0.03, y=0.1)
     axes.autoscale_view()
@@ -83,7 +73,7 @@ def _fold_barrier(axes: Axes, landscape: Landscape) -> None:
     saddle, flat = landscape.rests[found.saddle], landscape.rests[0]
     _barrier(axes, 0.05, flat, saddle, (0.0, saddle.gamma / math.pi))
     text = _height("fold", found.fold, landscape.extrapolated)
-    say(axes, (0.05, flat.energy + 0.74 * found.fold), text, (7.0, 0.0))
+    style.annotate(axes, (0.05, flat.energy + 0.74 * found.fold), text, (7.0, 0.0))
 
 
 def _saddle_and_well(axes: Axes, landscape: Landscape) -> None:
@@ -100,17 +90,15 @@ def _saddle_and_well(axes: Axes, landscape: Landscape) -> None:
     axes.set_ylim(end.energy - 0.7 * found.open, saddle.energy + 0.45 * found.open)
     _barrier(axes, x, end, saddle, (saddle.gamma / math.pi, x))
     text = _height("open", found.open, landscape.extrapolated)
-    say(axes, (x, 0.5 * (end.energy + saddle.energy)), text, (6.0, 0.0))
+    style.annotate(axes, (x, 0.5 * (end.energy + saddle.energy)), text, (6.0, 0.0))
     for rest, name, away in ((saddle, "saddle", 11.0), (end, "folded", -16.0)):
         index = "?" if rest.index_free is None else rest.index_free
-        text = (
-            f"{name}\n$\\gamma$ = {rest.gamma / math.pi:.4f} $\\pi$\nindex without grips: {index}"
-        )
-        place, side = (rest.gamma / math.pi, rest.energy), "bottom" if away > 0.0 else "top"
-        say(axes, place, text, (0.0, away), ha="center", va=side, fontsize=7.5)
-    label_axes(axes, "$\\gamma/\\pi$", ENERGY)
+        gamma, side = rest.gamma / math.pi, "bottom" if away > 0.0 else "top"
+        text = f"{name}\n$\\gamma$ = {gamma:.4f} $\\pi$\nindex without grips: {index}"
+        look = {"ha": "center", "va": side, "fontsize": 7.5}
+        style.annotate(axes, (gamma, rest.energy), text, (0.0, away), **look)
+    style.label_axes(axes, "$\\gamma/\\pi$", style.ENERGY, ticks=(5, 0))
     axes.ticklabel_format(useOffset=False)
-    axes.xaxis.set_major_locator(MaxNLocator(5))
 
 
 def _height(name: str, mesh: float, known: Mapping[str, tuple[float, float]]) -> str:

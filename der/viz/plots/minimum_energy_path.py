@@ -1,4 +1,4 @@
-"""The minimum-energy path of a free ring as a picture: from flat over the saddle to folded."""
+"""The minimum-energy path of a free ring as a picture: from flat by the saddle to folded."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from matplotlib.figure import Figure
 
 from der.records.landscape import Pass, Saddle
 from der.viz.palette import INK, QUIET, STABLE
+from der.viz.plots import style
 from der.viz.plots.rings import seen
-from der.viz.plots.style import ENERGY, blank, entry, label_axes, legend_below, mark
 from der.viz.titles import sure, title
 
 RINGS = 6  # on the path
 LINE: dict[str, Any] = {"color": STABLE, "linewidth": 1.7}
-WELL, SADDLE = mark("o", 5.6, INK), mark("^", 6.6)
+WELL, SADDLE = style.mark("o", 5.6, INK), style.mark("^", 6.6)
 SIDES = (0.085, 0.895)  # left edge and width of both axes, of the figure
 
 
 def draw(found: Pass) -> Figure:
-    """The picture of a pass: energy along its path, with the ring at places of the path above.
+    """The picture of a pass: energy along its path, and above it the ring at places of the path.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def draw(found: Pass) -> Figure:
     """
     if found.saddle is None or found.fold is None or found.open is None:
         raise ValueError(f"pass must have a saddle to be plotted: {found.why}")
-    figure = blank(7.6, 5.0, title(found))
+    figure = style.blank(7.6, 5.0, title(found))
     axes = figure.add_axes((SIDES[0], 0.165, SIDES[1], 0.5))
     axes.margins(x=0.11)
     progress, energy = found.way.T
@@ -40,16 +40,13 @@ def draw(found: Pass) -> Figure:
     axes.plot(progress, energy, zorder=2, **LINE)
     for k, look in ((0, WELL), (top, SADDLE), (len(energy) - 1, WELL)):
         axes.plot(progress[k], energy[k], zorder=5, clip_on=False, **look)
-    label_axes(axes, "distance along the path  [rad, root mean square]", ENERGY)
-    text: dict[str, Any] = {"transform": axes.transAxes, "va": "top", "fontsize": 8, "color": INK}
-    axes.text(0.03, 0.975, "\n".join(_barriers(found, found.saddle)), **text)
+    style.label_axes(axes, "distance along the path  [rad, root mean square]", style.ENERGY)
+    place: dict[str, Any] = {"ha": "left", "va": "top", "fontsize": 8, "transform": axes.transAxes}
+    style.place_text(axes, (0.03, 0.975), "\n".join(_barriers(found, found.saddle)), **place)
     _enlarge(axes, found, float(progress[top]))
-    handles = [
-        entry("minimum-energy path", **LINE),
-        entry("well: flat, folded", **WELL),
-        entry("saddle", **SADDLE),
-    ]
-    legend_below(figure, handles)
+    states = {"well: flat, folded": WELL, "saddle": SADDLE}
+    entries = {"minimum-energy path": LINE} | states
+    style.legend_below(figure, [style.entry(text, **look) for text, look in entries.items()])
     if len(found.shapes):
         _draw_rings(figure.add_axes((SIDES[0], 0.69, SIDES[1], 0.24)), found, axes.get_xlim())
     return figure

@@ -1,4 +1,4 @@
-"""How a folded ring is opened by loads: rings under their loads, curves of loads, and works."""
+"""How loads open a folded ring: rings under their loads, curves of the loads, and their work."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 
-from der.records.opening import ALIKE, KINDS, LeastPush, Push
+from der.records.opening import ALIKE, EVENTS, KINDS, LeastPush, Push
 from der.utils.checks import Array
 from der.viz.palette import DASHES, FREE, INK, STABLE, UNSTABLE
+from der.viz.plots import style
 from der.viz.plots.rings import bare, seen
-from der.viz.plots.style import blank, entry, label_axes, legend_below, mark
 from der.viz.ribbon import projected
 from der.viz.titles import sure, title
 
@@ -25,22 +24,11 @@ AXES = {
     "force": ("change of distance  $\\Delta D/a$", "force  $P\\,a^2/GJ$"),
     "couple": ("angle  $\\theta$  [rad]", "couple  $C\\,a/GJ$"),
 }
-MOST = 7  # loads of each kind whose works are shown
+MOST = 7  # loads of each kind whose work is shown
 SHAPES = ("force", "couple", "force dead", "couple dead")
-EVENTS = {
-    "pass": "reaches a saddle",
-    "fold": "snaps at a fold",
-    "branch": "snaps at a branch point",
-    "limit": "limit of a dead load",
-    "end": "end of the path",
-}
-MARKS = {  # of events
-    "pass": mark("^", 6.2),
-    "fold": mark("D", 5.2),
-    "branch": mark("s", 5.2),
-    "limit": mark("v", 6.2),
-    "end": mark("X", 6.2),
-}
+SYMBOLS = {"pass": "^", "fold": "D", "branch": "s", "limit": "v", "end": "X"}
+MARKS = {name: style.mark(s, 5.2 if s in "Ds" else 6.2) for name, s in SYMBOLS.items()}  # of events
+BEST_DEAD: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": DASHES}
 OTHERS: dict[str, Any] = {"color": "#d0d0d0", "linewidth": 0.8}
 DEAD: dict[str, Any] = {"marker": "|", "markersize": 9, "color": INK, "linestyle": "none"}
 ARROW = 0.15  # length of an arrow
@@ -48,7 +36,7 @@ WIDE, HIGH = 1.0, 0.5  # of the picture of one ring, in its own units
 
 
 def draw(found: LeastPush) -> Figure:
-    """The picture of opening loads: rings as they open, loads over displacements, least works.
+    """The picture of opening loads: opening rings, loads over displacements, and the least work.
 
     Raises
     ------
@@ -57,7 +45,7 @@ def draw(found: LeastPush) -> Figure:
     """
     if not found.least:
         raise ValueError(f"push must open the ring to be plotted: {found.why}")
-    figure = blank(9.2, 6.9, title(found))
+    figure = style.blank(9.2, 6.9, title(found))
     _draw_rings(figure.add_axes((0.01, 0.665, 0.98, 0.295)), found)
     kinds = [kind for kind in KINDS if kind in found.least]
     places = {1: [(0.17, 0.43)], 2: [(0.435, 0.195), (0.145, 0.195)]}[len(kinds)]
@@ -65,37 +53,44 @@ def draw(found: LeastPush) -> Figure:
         _draw_curves(figure.add_axes((0.07, low, 0.31, high)), found, kind)
     ranked = {kind: _ranked(found, kind) for kind in kinds}
     _draw_works(figure.add_axes((0.64, 0.165, 0.345, 0.465)), found, ranked)
-    legend_below(figure, _entries(found, ranked))
+    style.legend_below(figure, _entries(found, ranked))
     return figure
 
 
 def _entries(found: LeastPush, ranked: Mapping[str, list[Push]]) -> list[Any]:
-    """What colours, lines and marks mean, of those that are there."""
+    """What colours, lines and marks mean, of those that occur."""
     handles: list[Any] = []
     for kind, ones in ranked.items():
         count = f"best {MOST} of {len(ones)}" if len(ones) > MOST else f"all {len(ones)}"
         label = f"quasi-static {kind}, {count} that open the ring"
         handles.append(Patch(color=COLOURS[kind], alpha=0.75, label=label))
-    handles.append(entry("others that open the ring", **OTHERS))
-    if any(_dashed(found, kind) for kind in ranked):
-        handles.append(entry("the best dead load", color=INK, linewidth=1.1, linestyle=DASHES))
-    if found.barrier is not None:
-        mesh = " (mesh)" if found.extrapolated else ""
-        label = f"barrier of the free ring, {found.barrier:.4g} GJ/a{mesh}"
-        handles.append(entry(label, color=FREE, linewidth=1.5))
-    events = {found.pushes[k].held.event for k in found.least.values()}
-    events |= {dead.event for k in found.least_dead.values() if (dead := found.pushes[k].dead)}
-    handles += [entry(text, **MARKS[name]) for name, text in EVENTS.items() if name in events]
-    if any(one.dead and one.opens_dead for ones in ranked.values() for one in ones[:MOST]):
-        handles.append(entry("work of the dead load at its limit", **DEAD))
-    return handles
+    best = [found.pushes[k].held for k in found.least.values()]
+    dead = [found.pushes[k].dead for k in found.least_dead.values()]
+    events = {instant.event for instant in (*best, *dead) if instant is not None}
+    mesh = " (mesh)" if found.extrapolated else ""
+    entries: list[tuple[object, str, dict[str, Any]]] = [
+        (True, "others that open the ring", OTHERS),
+        (any(_dashed(found, kind) for kind in ranked), "the best dead load", BEST_DEAD),
+        (
+            found.barrier,
+            f"barrier of the free ring, {found.barrier or 0.0:.4g} GJ/a{mesh}",
+            {"color": FREE, "linewidth": 1.5},
+        ),
+        *((name in events, text, MARKS[name]) for name, text in EVENTS.items()),
+        (
+            any(one.dead and one.opens_dead for ones in ranked.values() for one in ones[:MOST]),
+            "work of the dead load at its limit",
+            DEAD,
+        ),
+    ]
+    return handles + [style.entry(text, **look) for occurs, text, look in entries if occurs]
 
 
 # --- Rings -----------------------------------------------------------------------------------
 
 
 def _draw_rings(row: Axes, found: LeastPush) -> None:
-    """Draw rings as they open, in one scale, with arrows where they are loaded."""
+    """Draw the opening rings in one scale, with arrows at their loads."""
     shown = [name for name in SHAPES if name in found.shapes]
     shapes = [found.shapes[name] for name in shown]
     views = [seen(x, level=points[1] - points[0]) for x, points in shapes]
@@ -113,28 +108,27 @@ def _draw_rings(row: Axes, found: LeastPush) -> None:
         ends = scale * (projected(points, view.camera) - view.middle) + at
         loads = projected(_loads(push, points), view.camera)
         _draw_arrows(row, ends, loads, heads=(1.0, 0.72) if kind == "couple" else (1.0,))
-        text: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 7.5, "color": INK}
-        caption = _caption(found, push, name)
-        row.text(i * WIDE, -0.5 * HIGH - 0.07, caption, linespacing=1.35, **text)
+        caption, below = _caption(found, push, name), (i * WIDE, -0.5 * HIGH - 0.07)
+        style.place_text(row, below, caption, va="top", fontsize=7.5, linespacing=1.35)
     bare(row, (-0.5 * WIDE, -0.5 * HIGH - 0.36), ((len(shown) - 0.5) * WIDE, 0.5 * HIGH + 0.04))
 
 
 def _loads(push: Push, points: Array) -> Array:
-    """Directions (2, 3) of unit length: of the forces, or of the axes of the couples."""
+    """Unit vectors (2, 3): of the forces, or of the axes of the couples."""
     pull = np.array(push.axis)
     if push.kind == "force":
         line = points[1] - points[0]
-        line = line / max(float(np.linalg.norm(line)), 1e-300)
-        pull = -line if push.direction == "together" else line
+        pull = line / max(float(np.linalg.norm(line)), 1e-300)
+        pull *= -1.0 if push.direction == "together" else 1.0
     return np.array([-pull, pull])
 
 
-def _draw_arrows(row: Axes, at: Array, way: Array, heads: tuple[float, ...]) -> None:
+def _draw_arrows(row: Axes, at: Array, loads: Array, heads: tuple[float, ...]) -> None:
     """Arrows at points (2, 2): a force has one head, the axis of a couple has two."""
-    longest = max(float(np.linalg.norm(way, axis=1).max()), 1e-9)
+    longest = max(float(np.linalg.norm(loads, axis=1).max()), 1e-9)
     look: dict[str, Any] = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.1}
     look |= {"shrinkA": 0, "shrinkB": 0, "mutation_scale": 8}
-    for place, along in zip(at, way, strict=True):
+    for place, along in zip(at, loads, strict=True):
         row.plot(*place, marker="o", markersize=3.4, color=INK, zorder=6)
         for share in heads:
             tip = place + share * ARROW / longest * along
@@ -142,18 +136,15 @@ def _draw_arrows(row: Axes, at: Array, way: Array, heads: tuple[float, ...]) -> 
 
 
 def _caption(found: LeastPush, push: Push, name: str) -> str:
-    """The load, where it acts, how the path ends, and the work: extrapolated where it is known."""
+    """The load, its points, the event at its end, and the work, extrapolated where known."""
     dead = name.endswith("dead")
     instant = push.dead if dead and push.dead is not None else push.held
-    work = f"work {instant.work:.4g} GJ/a"
+    work = f"work {instant.work:.4g} GJ/a{' (mesh)' if found.extrapolated else ''}"
     if name in found.extrapolated:
-        work = (
-            f"work {sure(*found.extrapolated[name])} GJ/a\nextrapolated (mesh {instant.work:.4g})"
-        )
-    elif found.extrapolated:
-        work += " (mesh)"
+        value = sure(*found.extrapolated[name])
+        work = f"work {value} GJ/a\nextrapolated (mesh {instant.work:.4g})"
     first = f"{'dead' if dead else 'quasi-static'} {push.kind}, {push.direction}"
-    return f"{first}\n{_points(push)}\n{EVENTS[instant.event]}\n{work}"
+    return "\n".join([first, _points(push), EVENTS[instant.event], work])
 
 
 def _points(push: Push) -> str:
@@ -172,8 +163,7 @@ def _draw_curves(axes: Axes, found: LeastPush, kind: str) -> None:
         if one.kind == kind and one.opens and one not in (best, at_limit):
             axes.plot(*_line(one), zorder=1, **OTHERS)
     if at_limit is not None and _dashed(found, kind):
-        look: dict[str, Any] = {"color": COLOURS[kind], "linewidth": 1.1, "linestyle": DASHES}
-        axes.plot(*_line(at_limit), zorder=3, **look)
+        axes.plot(*_line(at_limit), zorder=3, **BEST_DEAD | {"color": COLOURS[kind]})
     axes.plot(*_line(best), color=COLOURS[kind], linewidth=1.8, zorder=4)
     end = best.held
     axes.plot(end.push, end.load, zorder=6, clip_on=False, **MARKS[end.event])
@@ -182,10 +172,8 @@ def _draw_curves(axes: Axes, found: LeastPush, kind: str) -> None:
     shown = [best] if at_limit is None else [best, at_limit]
     axes.set_ylim(0.0, 2.2 * max(one.peak for one in shown))
     axes.set_xlim(0.0, 1.7 * max(one.held.push for one in shown))
-    label_axes(axes, *AXES[kind])
+    style.label_axes(axes, *AXES[kind], ticks=(6, 5))
     axes.xaxis.labelpad = 2
-    axes.xaxis.set_major_locator(MaxNLocator(6))
-    axes.yaxis.set_major_locator(MaxNLocator(5))
 
 
 def _dashed(found: LeastPush, kind: str) -> bool:
@@ -194,14 +182,14 @@ def _dashed(found: LeastPush, kind: str) -> bool:
 
 
 def _line(push: Push) -> tuple[Array, Array]:
-    """Load over displacement, smooth between the equilibria that were solved for."""
+    """Load over displacement, smooth between the computed equilibria."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
     x, load, _ = push.curve.T
     if len(x) < 3 or np.any(np.diff(x) <= 0.0):
         return x, load
     fine = np.linspace(x[0], x[-1], 120)
-    through = PchipInterpolator if push.falls else CubicSpline  # where it snaps there is a kink
+    through = PchipInterpolator if push.falls else CubicSpline  # at a snap there is a kink
     return fine, through(x, load)(fine)
 
 
@@ -209,7 +197,7 @@ def _line(push: Push) -> tuple[Array, Array]:
 
 
 def _draw_works(axes: Axes, found: LeastPush, ranked: Mapping[str, list[Push]]) -> None:
-    """Draw works of the best loads as bars, and the works of dead loads at their limits."""
+    """Draw the work of the best loads as bars, and that of dead loads at their limits."""
     rows = [one for ones in ranked.values() for one in ones[:MOST]]
     place = np.arange(len(rows))[::-1].astype(float)
     place[: sum(one.kind == "force" for one in rows)] += 0.6
@@ -219,18 +207,17 @@ def _draw_works(axes: Axes, found: LeastPush, ranked: Mapping[str, list[Push]]) 
             axes.plot(one.dead.work, y, zorder=4, **DEAD)
             continue
         text = "no limit of a dead load" if one.dead is None else "a dead load does not open it"
-        say: dict[str, Any] = {"xytext": (4.0, 0.0), "textcoords": "offset points"}
-        axes.annotate(text, (0.0, y), va="center_baseline", fontsize=6.5, color="white", **say)
+        look = {"va": "center_baseline", "fontsize": 6.5, "color": "white", "path_effects": []}
+        style.annotate(axes, (0.0, y), text, (4.0, 0.0), **look)
     if found.barrier is not None:
         axes.axvline(found.barrier, color=FREE, linewidth=1.5, zorder=3)
     widest = max(one.held.work for one in rows)
     axes.set_xlim(0.0, 1.05 * min(widest, 2.0 * (found.barrier or math.inf)))
-    label_axes(axes, "work until the ring opens  $W\\,a/GJ$", "")
+    style.label_axes(axes, "work until the ring opens  $W\\,a/GJ$", "", ticks=(5, 0))
     axes.set_yticks(place, [f"{_points(one)}  {one.direction}" for one in rows])
     axes.tick_params(axis="y", length=0, labelsize=7)
     axes.spines["left"].set_visible(False)
     axes.xaxis.labelpad = 2
-    axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.grid(axis="x", color="#e8e8e8", linewidth=0.6, zorder=0)
     axes.set_axisbelow(True)
 
@@ -238,17 +225,14 @@ def _draw_works(axes: Axes, found: LeastPush, ranked: Mapping[str, list[Push]]) 
 def _ranked(found: LeastPush, kind: str) -> list[Push]:
     """Loads of a kind that open the ring, by work.
 
-    Those of nearly the same work are in the order: the best one; then by the number of snaps,
+    Loads of nearly the same work are in the order: the best one; then by the number of snaps,
     places and directions.
     """
     best = found.pushes[found.least[kind]]
     opening = [one for one in found.pushes if one.kind == kind and one.opens]
     opening.sort(key=lambda one: one.held.work)
-    keyed: list[tuple[Any, Push]] = []
-    start = -math.inf
-    for k, one in enumerate(opening):
-        if one.held.work > (1.0 + ALIKE) * start:
-            start = one.held.work
-        key = (start, one is not best, one.falls, one.points, one.direction, k)
-        keyed.append((key, one))
-    return [one for _, one in sorted(keyed, key=lambda pair: pair[0])]
+    start, starts = -math.inf, []  # least work of each group of nearly the same work
+    for one in opening:
+        start = start if one.held.work <= (1.0 + ALIKE) * start else one.held.work
+        starts.append((start, one is not best, one.falls, one.points, one.direction))
+    return [opening[k] for k in sorted(range(len(opening)), key=starts.__getitem__)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,8 +15,8 @@ from matplotlib.ticker import MaxNLocator
 
 from der.utils.checks import Array
 from der.viz.palette import INK, QUIET
+from der.viz.plots import style
 from der.viz.plots.regions import Boundary, Sheet, pixels
-from der.viz.plots.style import blank, entry, legend_below, mark
 
 DPI = 200
 REGIONS = (  # name and colour by label: the hue is the snapping, the strength stability
@@ -65,7 +64,7 @@ class Slice(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class DiagramPicture:
-    """All that is drawn of a phase diagram."""
+    """What is drawn of a phase diagram."""
 
     title: str
     parameters: tuple[str, str]  # across and up
@@ -89,27 +88,7 @@ class DiagramPicture:
 def draw(diagram: DiagramPicture) -> Figure:
     """The picture of a phase diagram: one plane, or slices of three dimensions."""
     several = len(diagram.slices) > 1
-    rows = math.ceil(len(diagram.slices) / COLUMNS)
-    above = 0.62 if diagram.mirrored else 0.42
-    each = 2.3 if diagram.mirrored else 2.15
-    width = 10.2 if several else (6.6 if diagram.mirrored else 4.8)
-    height = each * rows + 2.1 if several else 4.6 + above
-    figure = blank(width, height, diagram.title, dpi=DPI)
-    if several:
-        grid = figure.add_gridspec(
-            rows,
-            COLUMNS,
-            left=0.5 / width,
-            right=1 - 0.15 / width,
-            bottom=1.25 / height,
-            top=1 - 0.72 / height,
-            wspace=0.06,
-            hspace=0.3 if diagram.mirrored else 0.2,
-        )
-        panels = [figure.add_subplot(grid[divmod(n, COLUMNS)]) for n in range(len(diagram.slices))]
-    else:
-        box = (0.62 / width, 1.3 / height, 1.0 - 0.82 / width, 3.3 / height)
-        panels = [figure.add_axes(box)]
+    figure, panels = _several(diagram) if several else _one(diagram)
     for n, (axes, one) in enumerate(zip(panels, diagram.slices, strict=True)):
         _draw_slice(axes, diagram, one)
         _label(axes, diagram, small=several)
@@ -118,39 +97,54 @@ def draw(diagram: DiagramPicture) -> Figure:
         axes.set_xlabel(PARAMETERS[diagram.parameters[0]] if bottom else "", color=INK)
         axes.set_ylabel(PARAMETERS[diagram.parameters[1]] if left else "", color=INK)
         axes.set_title(one.title, fontsize=8.5, color=INK, pad=14.0 if diagram.mirrored else 4.0)
-    legend_below(figure, _entries(diagram))
+    style.legend_below(figure, _entries(diagram))
     return figure
+
+
+def _one(diagram: DiagramPicture) -> tuple[Figure, list[Axes]]:
+    """The page of one plane."""
+    width, height = (6.6, 5.22) if diagram.mirrored else (4.8, 5.02)
+    figure = style.blank(width, height, diagram.title, dpi=DPI)
+    box = (0.62 / width, 1.3 / height, 1.0 - 0.82 / width, 3.3 / height)
+    return figure, [figure.add_axes(box)]
+
+
+def _several(diagram: DiagramPicture) -> tuple[Figure, list[Axes]]:
+    """The page of slices."""
+    rows = math.ceil(len(diagram.slices) / COLUMNS)
+    each, gap = (2.3, 0.3) if diagram.mirrored else (2.15, 0.2)
+    width, height = 10.2, each * rows + 2.1
+    figure = style.blank(width, height, diagram.title, dpi=DPI)
+    sides = {"left": 0.5 / width, "right": 1 - 0.15 / width}
+    sides |= {"bottom": 1.25 / height, "top": 1 - 0.72 / height, "wspace": 0.06, "hspace": gap}
+    grid = figure.add_gridspec(rows, COLUMNS, **sides)
+    return figure, [
+        figure.add_subplot(grid[divmod(n, COLUMNS)]) for n in range(len(diagram.slices))
+    ]
 
 
 def _draw_slice(axes: Axes, diagram: DiagramPicture, one: Slice) -> None:
     """Draw regions, boundaries and marked cases."""
     ends = np.array([(0.0, 0.0), (1.0, 1.0)])
+    colours = ListedColormap([colour for _, colour in REGIONS])
+    look: dict[str, Any] = {"cmap": colours, "vmin": -0.5, "vmax": len(REGIONS) - 0.5, "zorder": 0}
+    look |= {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
     for sheet in one.sheets:
         (left, low), (right, high) = diagram.values(ends, sheet.axis).tolist()
-        axes.imshow(
-            pixels(sheet, one.boundaries).T,
-            extent=(left, right, low, high),
-            cmap=ListedColormap([colour for _, colour in REGIONS]),
-            vmin=-0.5,
-            vmax=len(REGIONS) - 0.5,
-            origin="lower",
-            aspect="auto",
-            interpolation="nearest",
-            zorder=0,
-        )
+        axes.imshow(pixels(sheet, one.boundaries).T, extent=(left, right, low, high), **look)
     for boundary in one.boundaries:
         x, y = diagram.values(boundary.line, boundary.axis).T
         axes.plot(x, y, zorder=3, **_line(boundary.kind)[1])
     for case in one.marks:
         place = diagram.values(case.place, case.axis)
-        axes.plot(*place, clip_on=False, zorder=6, **mark(SYMBOLS[case.shape], 5.0))
+        axes.plot(*place, clip_on=False, zorder=6, **style.mark(SYMBOLS[case.shape], 5.0))
 
 
 def _line(kind: str) -> tuple[str, dict[str, Any]]:
     """Name and look of a boundary."""
     own = kind.removesuffix(" (scan)")
-    name, style, width = BOUNDARIES.get(own, (kind, "-.", 1.0))
-    return name if own == kind else kind, {"color": INK, "linestyle": style, "linewidth": width}
+    name, dashes, width = BOUNDARIES.get(own, (kind, "-.", 1.0))
+    return name if own == kind else kind, {"color": INK, "linestyle": dashes, "linewidth": width}
 
 
 def _label(axes: Axes, diagram: DiagramPicture, *, small: bool) -> None:
@@ -168,37 +162,35 @@ def _label(axes: Axes, diagram: DiagramPicture, *, small: bool) -> None:
 
 
 def _join(axes: Axes, diagram: DiagramPicture, *, small: bool) -> None:
-    """Ticks from both sides towards the ring that is the same about both twisting axes."""
+    """Ticks of both twisting axes, which meet at the ring that is the same about both."""
     low, high = diagram.spans[0]
     inner = MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(low, high)
-    first = low + 1e-9 if small else low - 1e-9  # beside the next slice's there is no room
+    first = (
+        low + 1e-9 if small else low - 1e-9
+    )  # in a slice, the first tick would overlap the neighbour's
     values = [float(v) for v in inner if first <= v < high - 1e-9]
     ticks = [*values, high, *(2.0 * high - v for v in values)]
     axes.set_xticks(ticks, [f"{min(v, 2.0 * high - v):.3g}" for v in ticks])
     axes.axvline(high, color=INK, linewidth=0.6, zorder=2)
     for at, sheet in zip((0.25, 0.75), diagram.slices[0].sheets, strict=True):
-        look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": INK}
-        text = f"${sheet.axis}$-axis twisting"
-        axes.text(at, 1.015, text, fontsize=8 if small else 9, transform=axes.transAxes, **look)
+        look = {"va": "bottom", "fontsize": 8 if small else 9, "transform": axes.transAxes}
+        style.place_text(axes, (at, 1.015), f"${sheet.axis}$-axis twisting", **look)
 
 
 def _entries(diagram: DiagramPicture) -> list[Any]:
-    """What colours, lines and symbols mean, of those that are there."""
+    """What colours, lines and symbols mean, of those that occur."""
     sheets = [sheet for one in diagram.slices for sheet in one.sheets]
     labels = set(np.unique([sheet.labels for sheet in sheets]).tolist())
+    kinds = sorted({boundary.kind for one in diagram.slices for boundary in one.boundaries})
     handles: list[Any] = [
         Patch(facecolor=colour, edgecolor=QUIET, linewidth=0.6, label=name)
         for k, (name, colour) in enumerate(REGIONS)
         if k in labels
     ]
-    handles += [entry(name, **look) for name, look in map(_line, _kinds(diagram.slices))]
-    shapes = dict.fromkeys(case.shape for one in diagram.slices for case in one.marks)
+    handles += [style.entry(name, **look) for name, look in map(_line, kinds)]
+    symbols = dict.fromkeys(case.shape for one in diagram.slices for case in one.marks)
     handles += [
-        entry(f"{shape}, shown in the paper", **mark(SYMBOLS[shape], 5.0)) for shape in shapes
+        style.entry(f"{shape}, shown in the paper", **style.mark(SYMBOLS[shape], 5.0))
+        for shape in symbols
     ]
     return handles
-
-
-def _kinds(slices: Sequence[Slice]) -> Iterable[str]:
-    """The kinds of all boundaries."""
-    return sorted({boundary.kind for one in slices for boundary in one.boundaries})

@@ -1,4 +1,4 @@
-"""The states of a ring that stays in its plane, side by side."""
+"""The planar states of a ring side by side."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from matplotlib.figure import Figure
 
 from der.records.planar import FOLDED, PlanarState, PlanarStates
 from der.utils.checks import Array
-from der.viz.palette import INK, STABLE, UNSTABLE
+from der.viz.palette import STABLE, UNSTABLE
+from der.viz.plots import style
 from der.viz.plots.rings import LARGER, closed_curve, draw_closed, strands_apart
-from der.viz.plots.style import blank, entry, legend_below
 from der.viz.titles import title
 
 COLUMNS = 6  # at most
 CELL, ROW = 1.55, 1.95  # inches, of a state
 APART = 0.16  # of the radius: how far the strands of an n-covered circle are drawn apart
+KINDS = ((True, "stable in its plane", STABLE), (False, "unstable in its plane", UNSTABLE))
 _ROUND, _ZERO = 1e-6, 1e-9  # of the radius; GJ/a: rounding
 
 
 def draw(found: PlanarStates) -> Figure:
-    """The picture of the states of a ring in its plane.
+    """The picture of the planar states of a ring.
 
     Raises
     ------
@@ -36,7 +37,7 @@ def draw(found: PlanarStates) -> Figure:
     rows = math.ceil(len(found) / COLUMNS)
     columns = math.ceil(len(found) / rows)
     width, height = max(columns * CELL, 5.4) + 0.3, rows * ROW + 0.95
-    figure = blank(width, height, title(found, "in its plane", mesh=False))
+    figure = style.blank(width, height, title(found, "in its plane", mesh=False))
     shapes = [] if found.shapes is None else [_drawn(x[:, 1:]) for x in found.shapes.x]
     extents = [float(np.ptp(x, axis=0).max()) for x in shapes]
     for k, state in enumerate(found.states):
@@ -44,35 +45,35 @@ def draw(found: PlanarStates) -> Figure:
         there = min(columns, len(found) - row * columns)
         left = 0.5 * width + (column - 0.5 * there) * CELL
         top = height - 0.45 - row * ROW
-        axes = figure.add_axes(
-            ((left + 0.08) / width, (top - 1.3) / height, (CELL - 0.16) / width, 1.26 / height)
-        )
+        box = np.array([left + 0.08, top - 1.3, CELL - 0.16, 1.26]) / ([width, height] * 2)
+        axes = figure.add_axes(tuple(box))
         axes.set_axis_off()
         if shapes:
             half = 0.54 * max(extents[k], max(extents) / LARGER)
             draw_closed(axes, shapes[k], _colour(state), half)
         _caption(axes, state)
-    kinds = ((True, "stable in its plane", STABLE), (False, "unstable in its plane", UNSTABLE))
-    there_are = {state.stable for state in found.states}
-    legend_below(
-        figure,
-        [entry(text, color=c, linewidth=1.8) for kind, text, c in kinds if kind in there_are],
-    )
+    occurring = {state.stable for state in found.states}
+    handles = [
+        style.entry(text, color=c, linewidth=1.8)
+        for is_stable, text, c in KINDS
+        if is_stable in occurring
+    ]
+    style.legend_below(figure, handles)
     return figure
 
 
 def _caption(axes: Axes, state: PlanarState) -> None:
     """Name, energy and index below a shape."""
     name = "\n".join(textwrap.wrap(state.name, 18))
-    text: dict[str, Any] = {"ha": "center", "va": "top", "transform": axes.transAxes}
-    axes.text(0.5, -0.02, name, fontsize=8.0, color=INK, linespacing=1.15, **text)
+    look: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
+    style.place_text(axes, (0.5, -0.02), name, fontsize=8.0, linespacing=1.15, **look)
     kind = "stable" if state.stable else f"index {'?' if state.index is None else state.index}"
     energy = state.energy if abs(state.energy) > _ZERO else 0.0
     lines = f"$U\\,a/GJ$ = {energy:.5g}, {kind}"
     if state.turning == FOLDED and state.packing is not None:
         lines += f"\npacking {state.packing:.4f}"
     low = -0.28 if "\n" in name else -0.16
-    axes.text(0.5, low, lines, fontsize=7.2, color=_colour(state), **text)
+    style.place_text(axes, (0.5, low), lines, fontsize=7.2, color=_colour(state), **look)
 
 
 def _colour(state: PlanarState) -> str:
@@ -80,10 +81,7 @@ def _colour(state: PlanarState) -> str:
 
 
 def _drawn(x: Array) -> Array:
-    """A smooth curve through vertices (n, 2); strands of an n-covered circle are moved apart.
-
-    A circle is n-covered where its vertices turn more than once about the middle.
-    """
+    """A smooth curve through vertices (n, 2); strands of an n-covered circle are moved apart."""
     away = x - x.mean(axis=0)
     radius = np.hypot(*away.T)
     turns = np.unwrap(np.arctan2(*away.T))

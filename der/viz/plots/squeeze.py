@@ -7,30 +7,20 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from der.records.planar import Squeeze
 from der.utils.checks import Array
+from der.viz.curve import arc_length, evenly
 from der.viz.palette import INK, STABLE, UNSTABLE
+from der.viz.plots import style
 from der.viz.plots.rings import closed_curve, draw_closed
-from der.viz.plots.style import (
-    ENERGY,
-    MARKS,
-    blank,
-    entry,
-    label_axes,
-    legend_below,
-    mark,
-    place_letters,
-    zero_line,
-)
 from der.viz.titles import title
 
 LETTERS = "ABCDEF"  # one for each shape
 NAMES = {"fold": "fold of the distance", "limit": "limit of the force", "branch": "branch point"}
-LINE: dict[bool, dict[str, Any]] = {
-    True: {"color": STABLE, "linewidth": 1.6},
-    False: {"color": UNSTABLE, "linewidth": 1.6},
+LINE: dict[bool, dict[str, Any]] = {  # by whether it is stable
+    stable: {"color": colour, "linewidth": 1.6}
+    for stable, colour in ((True, STABLE), (False, UNSTABLE))
 }
 
 
@@ -45,34 +35,30 @@ def draw(found: Squeeze) -> Figure:
     if not len(found):
         raise ValueError("states must be at least one to be plotted, got none")
     pulled = found.distance[-1] > found.distance[0]
-    figure = blank(7.6, 5.6, title(found, "pulled" if pulled else "squeezed", mesh=False))
+    figure = style.blank(7.6, 5.6, title(found, "pulled" if pulled else "squeezed", mesh=False))
     chosen = _chosen(found)
     if found.shapes is not None:
         _draw_shapes(figure, found, found.shapes.x[chosen][:, :, 1:], chosen)
-    for left, values, label in (
-        (0.095, found.force, "force  $F\\,a^2/GJ$"),
-        (0.59, found.energy, ENERGY),
-    ):
+    force = "force  $F\\,a^2/GJ$"
+    for left, values, label in ((0.095, found.force, force), (0.59, found.energy, style.ENERGY)):
         axes = figure.add_axes((left, 0.13, 0.385, 0.45))
         _draw_values(axes, found, values, label)
         places = np.column_stack([found.distance, values])
-        place_letters(axes, LETTERS, places[chosen], places)
+        style.place_letters(axes, LETTERS, places[chosen], places)
     kinds = dict.fromkeys(point.kind for point in found.points)
-    handles = [entry(NAMES[kind], **mark(*MARKS[kind])) for kind in kinds]
-    handles.append(entry("stable at fixed distance", **LINE[True]))
+    handles = [style.entry(NAMES[kind], **style.mark(*style.MARKS[kind])) for kind in kinds]
+    handles.append(style.entry("stable at fixed distance", **LINE[True]))
     if any(index != 0 for index in found.index):
-        handles.append(entry("unstable at fixed distance", **LINE[False]))
-    legend_below(figure, handles)
+        handles.append(style.entry("unstable at fixed distance", **LINE[False]))
+    style.legend_below(figure, handles)
     return figure
 
 
 def _chosen(found: Squeeze) -> list[int]:
     """States that are drawn: evenly along the curve of energy over distance."""
-    spans = [max(float(np.ptp(c)), 1e-300) for c in (found.distance, found.energy)]
-    steps = np.hypot(np.diff(found.distance) / spans[0], np.diff(found.energy) / spans[1])
-    along = np.append(0.0, np.cumsum(steps))
-    wanted = np.linspace(0.0, along[-1], min(len(LETTERS), len(found)))
-    return sorted({int(np.argmin(np.abs(along - place))) for place in wanted})
+    values = np.column_stack([found.distance, found.energy])
+    spans = np.maximum(np.ptp(values, axis=0), 1e-300)
+    return evenly(arc_length(values / spans), min(len(LETTERS), len(found)))
 
 
 def _draw_shapes(figure: Figure, found: Squeeze, x: Array, chosen: list[int]) -> None:
@@ -85,8 +71,8 @@ def _draw_shapes(figure: Figure, found: Squeeze, x: Array, chosen: list[int]) ->
         spots = 0.5 * (one + np.roll(one, 1, axis=0))[[0, len(one) // 2]]
         axes.plot(*spots.T, "o", color=INK, markersize=4.0, zorder=4)
         text = rf"$\bf{{{LETTERS[k]}}}$   $d/a$ = {found.distance[at]:.3g}"
-        look: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 8, "color": INK}
-        axes.text(0.5, -0.02, text, transform=axes.transAxes, **look)
+        look = {"va": "top", "fontsize": 8, "transform": axes.transAxes}
+        style.place_text(axes, (0.5, -0.02), text, **look)
 
 
 def _draw_values(axes: Axes, found: Squeeze, values: Array, label: str) -> None:
@@ -95,10 +81,8 @@ def _draw_values(axes: Axes, found: Squeeze, values: Array, label: str) -> None:
     axes.plot(found.distance, values, **LINE[True])
     axes.plot(found.distance, np.where(stable, np.nan, values), **LINE[False])
     if values.min() < 0.0 < values.max() or not values[0]:
-        zero_line(axes)
+        style.zero_line(axes)
     for point in found.points:
         value = point.force if values is found.force else point.energy
-        axes.plot(point.distance, value, zorder=5, **mark(*MARKS[point.kind]))
-    label_axes(axes, "distance of the points  $d/a$", label)
-    axes.xaxis.set_major_locator(MaxNLocator(6))
-    axes.yaxis.set_major_locator(MaxNLocator(6))
+        axes.plot(point.distance, value, zorder=5, **style.mark(*style.MARKS[point.kind]))
+    style.label_axes(axes, "distance of the points  $d/a$", label, ticks=(6, 6))

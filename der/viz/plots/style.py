@@ -1,6 +1,6 @@
 """The style of all still pictures: figures, axes, marks, texts, legends, and saving.
 
-Figures belong to nobody: nothing global changes, and no display is needed.
+Figures are made without pyplot: no global state changes, and no display is needed.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 
 from der.records.path import Path
 from der.utils.checks import Array
@@ -25,11 +27,8 @@ from der.viz.palette import INK, QUIET, STRETCHES
 
 FORMATS = (".png", ".pdf", ".svg")
 DPI = 150
-GAMMA, MOMENT, ENERGY = (
-    "rotation of a grip  $\\gamma/\\pi$",
-    "moment  $M\\,a/GJ$",
-    "energy  $U\\,a/GJ$",
-)
+GAMMA = "rotation of a grip  $\\gamma/\\pi$"
+MOMENT, ENERGY = "moment  $M\\,a/GJ$", "energy  $U\\,a/GJ$"
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 MARKS = {  # marker and size of special points, by their kind
     "fold": ("D", 4.6),
@@ -49,7 +48,7 @@ def save(figure: Figure, file: FilePath) -> None:
         If the suffix is not one of FORMATS or the file cannot be written.
     """
     suffix = checked_suffix("plot", file, FORMATS)
-    # the version of matplotlib in it would make the same picture another file
+    # matplotlib's version is left out, so that equal pictures are equal files
     metadata: dict[str, Any] = {"Software": None} if suffix == ".png" else {}
     write("plot", file, lambda at: figure.savefig(at, format=suffix[1:], metadata=metadata))
 
@@ -65,13 +64,40 @@ def blank(width: float, height: float, title: str, *, dpi: int = DPI) -> Figure:
     return figure
 
 
-def label_axes(axes: Axes, across: str, up: str, *, fontsize: float = 9.0) -> None:
-    """Put labels on axes and give them the look of all pictures."""
+def stacked(figure: Figure, ratio: float, **grid: float) -> tuple[Axes, Axes]:
+    """Axes above each other over one abscissa; ``ratio``: of the upper to the lower height."""
+    places = figure.add_gridspec(2, 1, height_ratios=(ratio, 1.0), hspace=0.07, **grid)
+    above = figure.add_subplot(places[0])
+    below = figure.add_subplot(places[1], sharex=above)
+    above.tick_params(labelbottom=False)
+    return above, below
+
+
+def label_axes(
+    axes: Axes, across: str, up: str, *, fontsize: float = 9.0, ticks: tuple[int, int] = (0, 0)
+) -> None:
+    """Put labels on axes and give them the look of all pictures.
+
+    Parameters
+    ----------
+    ticks : the most intervals between ticks, across and up; 0: matplotlib's choice.
+    """
+    for axis, most in zip((axes.xaxis, axes.yaxis), ticks, strict=True):
+        if most:
+            axis.set_major_locator(MaxNLocator(most))
     axes.set_xlabel(across, fontsize=fontsize, color=INK)
     axes.set_ylabel(up, fontsize=fontsize, color=INK)
     axes.tick_params(labelsize=fontsize - 1.0, color=QUIET, labelcolor=INK, direction="in")
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(QUIET)
+
+
+def dress_bar(bar: Colorbar, label: str, ticks: Sequence[float], size: float) -> None:
+    """Label, ticks and look of a colour bar."""
+    bar.set_label(label, fontsize=size, color=INK)
+    bar.set_ticks(list(ticks))
+    bar.ax.tick_params(labelsize=size - 1.0, color=QUIET, labelcolor=INK)
+    bar.outline.set_visible(False)
 
 
 def zero_line(axes: Axes) -> None:
@@ -80,15 +106,9 @@ def zero_line(axes: Axes) -> None:
 
 
 def mark(marker: str, size: float, face: str = "white") -> dict[str, Any]:
-    """How a special state is marked."""
-    return {
-        "linestyle": "none",
-        "marker": marker,
-        "markersize": size,
-        "markerfacecolor": face,
-        "markeredgecolor": INK,
-        "markeredgewidth": 0.9,
-    }
+    """The look of a special state."""
+    look = {"linestyle": "none", "marker": marker, "markersize": size}
+    return look | {"markerfacecolor": face, "markeredgecolor": INK, "markeredgewidth": 0.9}
 
 
 def entry(label: str, **look: Any) -> Line2D:
@@ -113,8 +133,14 @@ def stretch_entries(*paths: Path) -> Iterator[Line2D]:
             yield entry(look.label, color=look.colour, linestyle=look.style, linewidth=1.6)
 
 
-def say(
-    axes: Axes, place: Sequence[float], text: str, away: Sequence[float] = (0.0, 0.0), **look: Any
+def place_text(axes: Axes, place: Sequence[float], text: str, **look: Any) -> None:
+    """Write a text at a place of the axes, centred in both directions unless the look differs."""
+    base: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9, "color": INK}
+    axes.text(place[0], place[1], text, **(base | look))
+
+
+def annotate(
+    axes: Axes, place: Sequence[float], text: str, away: Sequence[float], **look: Any
 ) -> None:
     """Write a text ``away`` (points) from a place of the axes, with a white halo."""
     base: dict[str, Any] = {"fontsize": 8.5, "color": INK, "va": "center", "zorder": 6}
@@ -136,27 +162,17 @@ def place_letters(axes: Axes, letters: str, places: Array, curve: Array) -> None
         room[np.any((spots < low + 8) | (spots > high - 8), axis=1)] = -1
         best = int(np.argmax(room))
         axes.plot(*here, "o", color=INK, markersize=3.6, zorder=3)
-        say(axes, here, letter, offsets[best], ha="center", fontweight="bold", zorder=5)
+        annotate(axes, here, letter, offsets[best], ha="center", fontweight="bold", zorder=5)
         obstacles = np.append(obstacles, spots[best : best + 1], axis=0)
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], *, fontsize: float = 8.0) -> None:
     """A legend along the lower edge, in as many columns as there is width for."""
+    look: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.004), "frameon": False}
+    look |= {"fontsize": fontsize, "labelcolor": INK, "handlelength": 2.0, "columnspacing": 1.6}
+    look |= {"handletextpad": 0.5, "labelspacing": 0.35, "borderaxespad": 0.1}
     for columns in range(len(handles), 0, -1):
-        legend = figure.legend(
-            handles=list(handles),
-            loc="lower center",
-            bbox_to_anchor=(0.5, 0.004),
-            ncols=columns,
-            frameon=False,
-            fontsize=fontsize,
-            handlelength=2.0,
-            columnspacing=1.6,
-            handletextpad=0.5,
-            labelspacing=0.35,
-            borderaxespad=0.1,
-            labelcolor=INK,
-        )
+        legend = figure.legend(handles=list(handles), ncols=columns, **look)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()

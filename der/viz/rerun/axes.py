@@ -113,12 +113,7 @@ def send_axes(sent: Entities, entity: str, axes: PlotAxes) -> None:
 
 
 def send_labels(
-    sent: Entities,
-    entity: str,
-    places: ArrayLike,
-    labels: Sequence[str],
-    *,
-    colour: Colour = CHALK,
+    sent: Entities, entity: str, places: ArrayLike, labels: Sequence[str], *, colour: Colour = CHALK
 ) -> None:
     """Send texts at places of 2-D axes."""
     points = rr.Points2D(places, labels=labels, radii=0.01, colors=colour, show_labels=True)

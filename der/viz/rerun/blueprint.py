@@ -19,8 +19,14 @@ from rerun.blueprint.encodings import (
 from der.viz.animation import ENERGIES, Motion
 from der.viz.rerun.axes import HIGH, WIDE
 
-UNDER = ("first", "second")  # where two motions that are beside each other put their sent
+UNDER = ("first", "second")  # entities of two motions beside each other
 CURVES = {"moment": "M a/GJ over gamma", "energy": "U a/GJ over gamma"}
+ROOTS = ("", *(f"/{under}" for under in UNDER))
+SERIES = {  # entities by the title of their view
+    "M and gamma": ["/series/moment", "/series/gamma"],
+    "U": ["/series/energy"],
+    "index and eigenvalues": ["/series/index", "/series/eigenvalues/**"],
+}
 SOLVING = "solving"  # entity and timeline of the states as they are found
 FPS, LASTS = 30.0, 10.0  # frames a second at most; seconds that a motion of fewer states lasts
 CAMERA = np.array([3.1, 1.75, 1.3])  # from the middle, over the mean radius; the ring lies in y, z
@@ -28,21 +34,20 @@ PAPER, NIGHT = (243, 243, 240), (13, 16, 17)  # of the ring's views; of axes, as
 
 
 def while_solving() -> rrb.Blueprint:
-    """The last state that was found, until the path is known."""
-    view = rrb.Spatial3DView(origin=SOLVING, name="solving", background=PAPER, line_grid=False)
+    """The last computed state, until the path is known."""
     panel = rrb.TimePanel(timeline=SOLVING, play_state="following", state="collapsed")
-    return rrb.Blueprint(view, panel, *_aside())
+    return rrb.Blueprint(_space(SOLVING, "solving"), panel, *_aside())
 
 
 def layout(motion: Motion) -> rrb.Blueprint:
     """The ring on the left, once for each energy; curves, series and texts on the right."""
     n = len(motion.x)
-    curves = rrb.Horizontal(*map(_curve_view, CURVES))
-    right = rrb.Vertical(
-        curves, _series(n), _states(n), _log_and_about(), row_shares=[4, 3, 1.7, 3]
-    )
-    everything = rrb.Horizontal(_ring_and_key(motion), right, column_shares=[1.05, 1])
-    return rrb.Blueprint(everything, _time(n), *_aside())
+    bounds = (-20, WIDE + 8, -HIGH - 8, 14)
+    curves = [_plane(f"curves/{name}", title, bounds) for name, title in CURVES.items()]
+    series = [_series_view(n, *one) for one in SERIES.items()]
+    parts = (rrb.Horizontal(*curves), rrb.Horizontal(*series), _states(n), _log_and_about())
+    right = rrb.Vertical(*parts, row_shares=[4, 3, 1.7, 3])
+    return _page(n, rrb.Horizontal(_ring_and_key(motion), right, column_shares=[1.05, 1]))
 
 
 def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
@@ -53,15 +58,9 @@ def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
         _ring_view("bending", motion, under=f"{under}/", name=name, size=size)
         for under, motion, name in zip(UNDER, motions, called, strict=True)
     ]
-    curves = [
-        _plane(
-            "/",
-            title,
-            (-20, WIDE + 8, -HIGH - 18, 14),
-            contents=[f"/curves/{name}/**", *(f"/{under}/curves/{name}/**" for under in UNDER)],
-        )
-        for name, title in CURVES.items()
-    ]
+    bounds = (-20, WIDE + 8, -HIGH - 18, 14)
+    entities = {name: [f"{under}/curves/{name}/**" for under in ROOTS] for name in CURVES}
+    curves = [_plane("/", title, bounds, contents=entities[name]) for name, title in CURVES.items()]
     series = [
         _series_view(n, f"{name} over steps", [f"/{under}/series/{name}" for under in UNDER])
         for name in ("gamma", "index")
@@ -70,38 +69,42 @@ def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
     texts = rrb.Horizontal(log, rrb.TextDocumentView(origin="about", name="about"))
     above = rrb.Vertical(rrb.Horizontal(*rings), _key(), row_shares=[9, 1])
     right = rrb.Vertical(*curves, rrb.Horizontal(*series), texts, row_shares=[3, 3, 2, 2.2])
-    return rrb.Blueprint(rrb.Horizontal(above, right, column_shares=[1.35, 1]), _time(n), *_aside())
+    return _page(n, rrb.Horizontal(above, right, column_shares=[1.35, 1]))
 
 
 def landscape_layout(motion: Motion, *, well: bool, surface: bool) -> rrb.Blueprint:
     """The ring on the left; on the right the landscape, in one dimension or in both."""
     n = len(motion.x)
-    bounds = (-24, WIDE + 26, -HIGH - 10, 14)
-    all_of_it = _plane("landscape/whole", "energy landscape, U a/GJ over gamma", bounds)
-    bounds = (-26, WIDE + 14, -HIGH - 10, 14)
-    part = _plane("landscape/well", "its saddle and the folded well", bounds)
-    curves = rrb.Horizontal(all_of_it, part) if well else all_of_it
-    texts = rrb.Horizontal(
-        _log_and_about(), _series_view(n, "M and gamma", ["/series/moment", "/series/gamma"])
-    )
+    title, bounds = "energy landscape, U a/GJ over gamma", (-24, WIDE + 26, -HIGH - 10, 14)
+    curves: Any = _plane("landscape/whole", title, bounds)
+    if well:
+        bounds = (-26, WIDE + 14, -HIGH - 10, 14)
+        part = _plane("landscape/well", "its saddle and the folded well", bounds)
+        curves = rrb.Horizontal(curves, part)
+    load = "M and gamma"
+    texts = rrb.Horizontal(_log_and_about(), _series_view(n, load, SERIES[load]))
     if not surface:
         right = rrb.Vertical(curves, _states(n), texts, row_shares=[5, 1.2, 3])
-        left = _ring_and_key(motion)
-        return rrb.Blueprint(
-            rrb.Horizontal(left, right, column_shares=[1, 1.25]), _time(n), *_aside()
-        )
-    relief = rrb.Spatial3DView(
-        origin="surface",
-        name="least energy over twist and distance of the grips",
-        background=PAPER,
-        line_grid=False,
-        eye_controls=_eye([-1.35, -2.0, 1.25], [0.0, 0.0, -0.15]),
-    )
+        return _page(n, rrb.Horizontal(_ring_and_key(motion), right, column_shares=[1, 1.25]))
+    title = "least energy over twist and distance of the grips"
+    eye = _eye([-1.35, -2.0, 1.25], [0.0, 0.0, -0.15])
+    relief = _space("surface", title, eye_controls=eye)
     views = rrb.Horizontal(_ring_view("bending", motion), relief, column_shares=[1, 1.5])
     above = rrb.Vertical(views, _key(), row_shares=[7, 1])
-    return rrb.Blueprint(
-        rrb.Vertical(above, rrb.Horizontal(curves, texts), row_shares=[2, 1]), _time(n), *_aside()
-    )
+    return _page(n, rrb.Vertical(above, rrb.Horizontal(curves, texts), row_shares=[2, 1]))
+
+
+def _page(n: int, views: rrb.Horizontal | rrb.Vertical) -> rrb.Blueprint:
+    """The layout of views of ``n`` steps."""
+    fps = min(FPS, max(1.0, n / LASTS))
+    look: dict[str, Any] = {"loop_mode": "all", "play_state": "paused", "state": "collapsed"}
+    return rrb.Blueprint(views, rrb.TimePanel(timeline="step", fps=fps, **look), *_aside())
+
+
+def _space(origin: str, name: str, **more: Any) -> rrb.Spatial3DView:
+    """A view in space, on paper."""
+    look: dict[str, Any] = {"background": PAPER, "line_grid": False}
+    return rrb.Spatial3DView(origin=origin, name=name, **look, **more)
 
 
 def _ring_and_key(motion: Motion) -> rrb.Vertical:
@@ -114,38 +117,15 @@ def _key() -> rrb.Spatial2DView:
     return _plane("key", "colours", (-12, 312, -10, 24))
 
 
-def _series(n: int) -> rrb.Horizontal:
-    return rrb.Horizontal(
-        _series_view(n, "M and gamma", ["/series/moment", "/series/gamma"]),
-        _series_view(n, "U", ["/series/energy"]),
-        _series_view(n, "index and eigenvalues", ["/series/index", "/series/eigenvalues/**"]),
-    )
-
-
 def _states(n: int) -> rrb.StateTimelineView:
     return rrb.StateTimelineView(
-        origin="states",
-        name="stability, last event",
-        time_view=rrb.TimeAxis(view_range=_steps(n)),
+        origin="states", name="stability, last event", time_view=rrb.TimeAxis(view_range=_steps(n))
     )
 
 
 def _log_and_about() -> rrb.Horizontal:
     """The log of events, and the parameters."""
-    return rrb.Horizontal(
-        _log("events"),
-        rrb.TextDocumentView(origin="about", name="about"),
-    )
-
-
-def _time(n: int) -> rrb.TimePanel:
-    return rrb.TimePanel(
-        timeline="step",
-        fps=min(FPS, max(1.0, n / LASTS)),
-        loop_mode="all",
-        play_state="paused",
-        state="collapsed",
-    )
+    return rrb.Horizontal(_log("events"), rrb.TextDocumentView(origin="about", name="about"))
 
 
 def _aside() -> tuple[rrb.BlueprintPanel, rrb.SelectionPanel]:
@@ -154,12 +134,7 @@ def _aside() -> tuple[rrb.BlueprintPanel, rrb.SelectionPanel]:
 
 
 def _ring_view(
-    energy: str,
-    motion: Motion,
-    *,
-    under: str = "",
-    name: str = "",
-    size: float | None = None,
+    energy: str, motion: Motion, *, under: str = "", name: str = "", size: float | None = None
 ) -> rrb.Spatial3DView:
     """The ring in the colours of one energy, the twisting axis upright.
 
@@ -180,11 +155,9 @@ def _ring_view(
         start=rrb.TimeRangeBoundary.infinite(),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
-    return rrb.Spatial3DView(
-        origin=f"{under}ring",
-        name=f"{name}, energy of {energy}" if name else f"energy of {energy}{scale}",
-        background=PAPER,
-        line_grid=False,
+    return _space(
+        f"{under}ring",
+        f"{name}, energy of {energy}" if name else f"energy of {energy}{scale}",
         eye_controls=_eye((size or motion.size) * CAMERA, [0.0, 0.0, 0.0]),
         overrides={
             f"{under}ring/ribbon": rr.Mesh3D.from_fields().visualizer(mappings=[mapping]),
@@ -198,10 +171,6 @@ def _eye(position: ArrayLike, target: ArrayLike) -> rrb.EyeControls3D:
     """The eye that sees a scene, the twisting axis upright."""
     up = [0.0, 0.0, 1.0]
     return rrb.EyeControls3D(kind="orbital", position=position, look_target=target, eye_up=up)
-
-
-def _curve_view(name: str) -> rrb.Spatial2DView:
-    return _plane(f"curves/{name}", CURVES[name], (-20, WIDE + 8, -HIGH - 8, 14))
 
 
 def _series_view(n: int, title: str, series: Sequence[str]) -> rrb.TimeSeriesView:

@@ -40,7 +40,6 @@ STATES: dict[str, Colour] = {
     "snap": (120, 94, 20),
     "self-crossing": GREEN,
 }
-STEPS = rr.components.InterpolationMode.StepAfter  # a count stays until it changes
 
 
 def send_key(sent: Entities) -> None:
@@ -137,12 +136,14 @@ def send_series(
         known = np.isfinite(values)
         if known.any():
             steps = np.flatnonzero(known | (motion.position < 0))  # a nan breaks the line
-            shape = STEPS if entity == "index" else rr.components.InterpolationMode.Linear
-            said = f"{label.split(' ')[0].rstrip(',')}, {name}" if name else label
-            style = rr.SeriesLines(
-                colors=colour or own, names=said, widths=2.0, interpolation_mode=shape
-            )
-            sent.still(f"series/{entity}", style)
+            modes = rr.components.InterpolationMode
+            # a count stays until it changes
+            look: dict[str, Any] = {
+                "colors": colour or own,
+                "interpolation_mode": modes.StepAfter if entity == "index" else modes.Linear,
+                "names": f"{label.split(' ')[0].rstrip(',')}, {name}" if name else label,
+            }
+            sent.still(f"series/{entity}", rr.SeriesLines(widths=2.0, **look))
             sent.run(f"series/{entity}", rr.Scalars.columns(scalars=values[steps]), steps)
 
 
@@ -160,23 +161,22 @@ def send_events(sent: Entities, path: Path, *, name: str = "") -> None:
     steps = [motion.step_of(point.position) for point in path.points]
     before = f"{name}: " if name else ""
     if steps:
-        sent.run(
-            "events", rr.TextLog.columns(text=[before + event_text(p) for p in path.points]), steps
-        )
+        texts = [before + event_text(point) for point in path.points]
+        sent.run("events", rr.TextLog.columns(text=texts), steps)
     kinds = [POINTS[point.kind] for point in path.points]
-    index = path.index.tolist()
-    states: dict[int, str] = {}
-    for step, k in enumerate(motion.position.tolist()):
-        if k < 0:
-            states[step] = MOVING
-        elif index[k] is not None:
-            states[step] = f"index {index[k]}" if index[k] else "stable"
-    _send_states(sent, "states/stability", states)
+    names = {
+        k: f"index {i}" if i else "stable"
+        for k, i in enumerate(path.index.tolist())
+        if i is not None
+    }
+    names[-1] = MOVING
+    at = enumerate(motion.position.tolist())
+    _send_states(sent, "states/stability", {step: names[k] for step, k in at if k in names})
     _send_states(sent, "states/event", {0: "start", **dict(zip(steps, kinds, strict=True))})
 
 
 def _send_states(sent: Entities, entity: str, states: Mapping[int, str]) -> None:
-    """A line of states, each from its step on until another follows."""
+    """A line of states, each from its step to the next one."""
     changes = [next(group) for _, group in groupby(sorted(states), key=lambda k: states[k])]
     if not changes:
         return

@@ -9,6 +9,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
+from der.utils.checks import Array
 from der.viz.animation import ENERGIES, Motion, grips, middles
 from der.viz.ribbon import ribbon, triangles, viridis
 
@@ -24,11 +25,11 @@ TURNED = 0.34  # radius of that arc, over the mean radius
 
 
 class Entities:
-    """The entities of a ring in a recording: sends what never changes, and what does at every step.
+    """The entities of a ring in a recording: sends those that are still and those that move.
 
     Parameters
     ----------
-    under : before the names of entities where there are two rings, "first/" for instance.
+    under : prefix of the names of entities where there are two rings, "first/" for instance.
     gamma : (n,) of the second timeline [rad]; the motion's own if not given.
     top : the energy density of the brightest colour; the motion's own if not given.
     """
@@ -50,19 +51,31 @@ class Entities:
         self.mdeg = np.rint(1e3 * np.degrees(turned)).astype(np.int64)
 
     def still(self, entity: str, *what: rr.AsComponents) -> None:
-        """Log what never changes."""
+        """Log what does not change."""
         self.stream.log(self.under + entity, *what, static=True, strict=True)
 
     def run(self, entity: str, columns: rr.ComponentColumnList, steps: ArrayLike = ()) -> None:
-        """Send columns, a row a step, of all steps or of some."""
+        """Send columns with a row a step, of all steps or of some."""
         at = np.asarray(steps, dtype=np.int64)
         if not len(at):
             at = np.arange(len(self.motion.x))
-        times = [
-            rr.TimeColumn("step", sequence=at),
-            rr.TimeColumn("gamma_mdeg", sequence=self.mdeg[at]),
-        ]
+        lines = {"step": at, "gamma_mdeg": self.mdeg[at]}
+        times = [rr.TimeColumn(name, sequence=values) for name, values in lines.items()]
         self.stream.send_columns(self.under + entity, times, columns, strict=True)
+
+    def strips(self, entity: str, lines: Array, colour: Colour, radius: float) -> None:
+        """Send a line (n, k, 3) a step; its radius is over the ring's mean radius."""
+        look = rr.LineStrips3D.from_fields(colors=colour, radii=radius * self.motion.size)
+        self.still(entity, look)
+        self.run(entity, rr.LineStrips3D.columns(strips=list(lines.astype(np.float32))))
+
+    def arrows(
+        self, entity: str, origins: Array, vectors: Array, colour: Colour, radius: float
+    ) -> None:
+        """Send an arrow (n, 3) a step; its radius is over the ring's mean radius."""
+        look = rr.Arrows3D.from_fields(colors=colour, radii=radius * self.motion.size)
+        self.still(entity, look)
+        self.run(entity, rr.Arrows3D.columns(origins=origins, vectors=vectors))
 
 
 def send_ring(sent: Entities) -> None:
@@ -94,8 +107,7 @@ def _send_ribbon(sent: Entities) -> None:
 def _send_lines(sent: Entities) -> None:
     """The centreline, the twisting axis, and the path of the free points up to the present."""
     motion = sent.motion
-    closed = np.concatenate([motion.x, motion.x[:, :1]], axis=1).astype(np.float32)
-    send_strips(sent, "ring/centreline", list(closed), INK, 0.004)
+    sent.strips("ring/centreline", closed(motion.x), INK, 0.004)
     end = REACH * motion.size
     axis = rr.LineStrips3D([[[0, 0, -end], [0, 0, end]]], colors=QUIET, radii=0.003 * motion.size)
     sent.still("ring/axis", axis)
@@ -104,48 +116,29 @@ def _send_lines(sent: Entities) -> None:
     for arm, s in enumerate((n_v / 4, 3 * n_v / 4)):
         point = 0.5 * (middle[:, math.floor(s)] + middle[:, math.ceil(s)])
         before = np.concatenate([point[:1], point[:-1]])
-        strips = np.stack([before, point], axis=1).astype(np.float32)
-        send_strips(sent, f"ring/trace/{arm}", list(strips), GREEN, 0.006)
+        sent.strips(f"ring/trace/{arm}", np.stack([before, point], axis=1), GREEN, 0.006)
 
 
-def send_strips(
-    sent: Entities,
-    entity: str,
-    strips: list[NDArray[np.float32]],
-    colour: Colour,
-    radius: float,
-) -> None:
-    """A line strip a step."""
-    style = rr.LineStrips3D.from_fields(colors=colour, radii=radius * sent.motion.size)
-    sent.still(entity, style)
-    sent.run(entity, rr.LineStrips3D.columns(strips=strips))
+def closed(x: Array) -> Array:
+    """Closed polygons (..., N + 1, 3) through vertices."""
+    return np.concatenate([x, x[..., :1, :]], axis=-2)
 
 
 def _send_grips(sent: Entities) -> None:
-    """The grips: how far each has turned, and the moment on it, along the axis and beside it."""
+    """The grips: the rotation of each, and the moment on it, along the axis and beside it."""
     motion = sent.motion
     size, n_v = motion.size, motion.x.shape[1]
     largest = float(np.nanmax(np.abs(motion.moment))) or 1.0
     middle, arcs = middles(motion.x), grips(motion, TURNED, ARC)
-    for name, edge, sign in (("first", 0, 1.0), ("second", n_v // 2, -1.0)):
+    for k, (name, edge, sign) in enumerate((("first", 0, 1.0), ("second", n_v // 2, -1.0))):
         entity = f"ring/grips/{name}"
         centre, d1 = middle[:, edge], motion.frames[:, edge, 0]
-        sent.still(f"{entity}/rotation", rr.Arrows3D.from_fields(colors=INK, radii=0.012 * size))
-        sent.run(
-            f"{entity}/rotation", rr.Arrows3D.columns(origins=centre, vectors=0.42 * size * d1)
-        )
-        arc = arcs[0 if sign > 0.0 else 1, :, :-1].astype(np.float32)
-        send_strips(sent, f"{entity}/angle", list(arc), INK, 0.005)
+        sent.arrows(f"{entity}/rotation", centre, 0.42 * size * d1, INK, 0.012)
+        sent.strips(f"{entity}/angle", arcs[k, :, :-1], INK, 0.005)
         vectors = np.zeros_like(centre)
         vectors[:, 2] = sign * 0.4 * size * np.nan_to_num(motion.moment) / largest
-        beside = centre - [0.0, 0.0, sign * 0.3 * size]
-        sent.still(
-            f"{entity}/moment", rr.Arrows3D.from_fields(colors=VERMILION, radii=0.018 * size)
-        )
-        sent.run(
-            f"{entity}/moment",
-            rr.Arrows3D.columns(origins=beside - 0.5 * vectors, vectors=vectors),
-        )
+        start = centre - [0.0, 0.0, sign * 0.3 * size] - 0.5 * vectors
+        sent.arrows(f"{entity}/moment", start, vectors, VERMILION, 0.018)
 
 
 def _send_modes(sent: Entities) -> None:
@@ -156,8 +149,7 @@ def _send_modes(sent: Entities) -> None:
     largest = np.linalg.norm(motion.u, axis=2).max(axis=1)
     known = np.isfinite(largest) & (largest > 0.0)
     ghost = motion.x[known] + GHOST * motion.size * motion.u[known] / largest[known, None, None]
-    closed = np.concatenate([ghost, ghost[:, :1]], axis=1).astype(np.float32)
     style = rr.LineStrips3D.from_fields(colors=(*VERMILION, 150), radii=0.008 * motion.size)
     sent.still("ring/softest_mode", style)
-    strips = rr.LineStrips3D.columns(strips=list(closed))
+    strips = rr.LineStrips3D.columns(strips=list(closed(ghost).astype(np.float32)))
     sent.run("ring/softest_mode", strips.partition(known.astype(int)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -29,20 +30,15 @@ COLOURS = {"well": SKY, "saddle": VERMILION}
 def send_landscape(sent: Entities, landscape: Landscape) -> None:
     """U over gamma with M = 0 states and barriers; beside it, larger, the folded well."""
     path, found = landscape.path, landscape.barriers
-    whole = PlotAxes(path.gamma, path.energy)
-    _send_part(sent, landscape, "landscape/whole", whole)
-    if found.saddle is None:
-        return
-    flat, saddle = landscape.rests[0], landscape.rests[found.saddle]
-    if found.fold is not None:
-        text = f"to fold {found.fold:.4g}"
-        _send_barrier(sent, "landscape/whole/fold", whole, flat, saddle, 0.05, text)
-    if found.open is not None:
-        folded = landscape.rests[-1]
-        part = well(landscape)
-        _send_part(sent, landscape, "landscape/well", part)
-        text = f"to open {found.open:.4g}"
-        _send_barrier(sent, "landscape/well/open", part, folded, saddle, 0.9, text)
+    parts = [("whole", "fold", PlotAxes(path.gamma, path.energy), landscape.rests[0], 0.05)]
+    if found.saddle is not None and found.open is not None:
+        parts.append(("well", "open", well(landscape), landscape.rests[-1], 0.9))
+    for part, name, axes, low, share in parts:
+        entity, height = f"landscape/{part}", getattr(found, name)
+        _send_part(sent, landscape, entity, axes)
+        if found.saddle is not None and height is not None:
+            saddle, text = landscape.rests[found.saddle], f"to {name} {height:.4g}"
+            _send_barrier(sent, f"{entity}/{name}", axes, (low, saddle, share), text)
 
 
 def well(landscape: Landscape) -> PlotAxes:
@@ -54,44 +50,35 @@ def well(landscape: Landscape) -> PlotAxes:
     if found.open is None or found.saddle is None:
         raise ValueError("landscape must have a barrier to open, got none")
     saddle, end = landscape.rests[found.saddle], landscape.rests[-1]
-    span = end.gamma - saddle.gamma
-    return PlotAxes(
-        landscape.path.gamma,
-        landscape.path.energy,
-        window=(
-            (saddle.gamma - 0.8 * abs(span), end.gamma + 0.4 * abs(span)),
-            (end.energy - 0.6 * found.open, saddle.energy + 0.4 * found.open),
-        ),
-    )
+    span = abs(end.gamma - saddle.gamma)
+    across = (saddle.gamma - 0.8 * span, end.gamma + 0.4 * span)
+    up = (end.energy - 0.6 * found.open, saddle.energy + 0.4 * found.open)
+    return PlotAxes(landscape.path.gamma, landscape.path.energy, window=(across, up))
 
 
 def _send_part(sent: Entities, landscape: Landscape, entity: str, axes: PlotAxes) -> None:
-    """Axes of it, with its M = 0 states."""
+    """Axes with U over gamma and the M = 0 states."""
     send_axes(sent, entity, axes)
     send_curve(sent, landscape.path, "energy", axes=axes, entity=entity)
     for kind, colour in COLOURS.items():
         rests = [rest for rest in landscape.rests if rest.kind == kind]
         places = axes.place([r.gamma for r in rests], [r.energy for r in rests]).reshape(-1, 2)
         shown = axes.holds(places)
-        texts = [kind for _ in rests]
-        if axes.window is not None:
-            texts = [f"{kind}, U = {round(rest.energy, 9) + 0.0:.4g}" for rest in rests]
+        texts = np.array([f"{kind}, U = {round(rest.energy, 9) + 0.0:.4g}" for rest in rests])
+        if axes.window is None:
+            texts = np.full(len(rests), kind)
         if shown.any():
-            points = rr.Points2D(
-                places[shown],
-                colors=colour,
-                radii=2.0,
-                labels=[text for text, there in zip(texts, shown, strict=True) if there],
-                show_labels=True,
-                draw_order=40.0,
-            )
+            look: dict[str, Any] = {"colors": colour, "radii": 2.0, "draw_order": 40.0}
+            labels = texts[shown].tolist()
+            points = rr.Points2D(places[shown], labels=labels, show_labels=True, **look)
             sent.still(f"{entity}/{kind}", points)
 
 
 def _send_barrier(
-    sent: Entities, entity: str, axes: PlotAxes, low: Rest, high: Rest, share: float, text: str
+    sent: Entities, entity: str, axes: PlotAxes, ends: tuple[Rest, Rest, float], text: str
 ) -> None:
-    """A level through the upper rest, and an arrow up to it from the lower one's level."""
+    """Levels through two states, and an arrow between the levels at a share of gamma."""
+    low, high, share = ends
     gamma = axes.gamma[0] + share * (axes.gamma[1] - axes.gamma[0])
     foot, top = axes.place([gamma, gamma], [low.energy, high.energy])
     level = axes.place([gamma, high.gamma], high.energy)
@@ -107,7 +94,7 @@ def _send_barrier(
 
 @dataclass(frozen=True)
 class Box:
-    """Where (gamma, distance, energy) lies in the view: in a box of SIDES about the origin."""
+    """Map (gamma, distance, energy) to the view: to a box of SIDES about the origin."""
 
     gamma: tuple[float, float]
     distance: tuple[float, float]
@@ -115,14 +102,10 @@ class Box:
 
     def place(self, gamma: Array, distance: Array, energy: Array) -> Array:
         """Points (..., 3)."""
-        shares = (
-            (gamma - self.gamma[0]) / (self.gamma[1] - self.gamma[0]),
-            (distance - self.distance[0]) / (self.distance[1] - self.distance[0]),
-            energy / self.ceiling,
-        )
-        return np.stack(
-            [side * (share - 0.5) for side, share in zip(SIDES, shares, strict=True)], axis=-1
-        )
+        low = np.array([self.gamma[0], self.distance[0], 0.0])
+        high = np.array([self.gamma[1], self.distance[1], self.ceiling])
+        values = np.stack([gamma, distance, energy], axis=-1)
+        return np.asarray(SIDES * ((values - low) / (high - low) - 0.5))
 
 
 def send_surface(sent: Entities, surface: Surface) -> None:
@@ -139,13 +122,12 @@ def send_surface(sent: Entities, surface: Surface) -> None:
     for k, snap in enumerate(surface.snaps):
         over = box.place(snap[:, 0], snap[:, 1], snap[:, 2] + lift)
         sent.still(f"surface/snaps/{k}", rr.LineStrips3D([over], colors=VERMILION, radii=0.008))
-    for name, rows, colour in (("folds", surface.folds, ORANGE), ("rests", surface.rests, SKY)):
+    for name, colour, label in (("folds", ORANGE, "fold"), ("rests", SKY, "M = 0")):
+        rows = getattr(surface, name)
         if len(rows):
             places = box.place(rows[:, 0], rows[:, 1], rows[:, 2] + lift)
-            label = "fold" if name == "folds" else "M = 0"
-            points = rr.Points3D(
-                places, colors=colour, radii=0.022, labels=[label] * len(rows), show_labels=False
-            )
+            look: dict[str, Any] = {"colors": colour, "radii": 0.022, "show_labels": False}
+            points = rr.Points3D(places, labels=[label] * len(rows), **look)
             sent.still(f"surface/{name}", points)
     motion = sent.motion
     now = box.place(motion.gamma, grip_distance(motion), motion.energy + lift)
@@ -155,27 +137,25 @@ def send_surface(sent: Entities, surface: Surface) -> None:
 
 
 def grip_distance(motion: Motion) -> Array:
-    """Distance (n,) between the grips along the twisting axis, a; negative where they passed."""
+    """Distance (n,) between the grips along the twisting axis, a; negative after they passed."""
     middle = middles(motion.x)[..., 2]
     distance: Array = middle[:, middle.shape[1] // 2] - middle[:, 0]
     return distance
 
 
 def _send_relief(sent: Entities, surface: Surface, box: Box) -> None:
-    """The surface as a mesh; cells that are unknown or above the ceiling are left out."""
+    """The surface as a mesh, without cells that are unknown or above the ceiling."""
     gamma, distance = np.meshgrid(surface.gamma, surface.distance, indexing="ij")
     energy = surface.energy
     known = np.isfinite(energy) & (energy <= box.ceiling)
     n, m = energy.shape
     points = box.place(gamma, distance, np.where(known, energy, 0.0))
     number = np.arange(n * m).reshape(n, m)
-    corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
-    there = [known[:-1, :-1], known[1:, :-1], known[1:, 1:], known[:-1, 1:]]
-    faces = [
-        np.stack([corners[k] for k in three], axis=-1)[np.all([there[k] for k in three], axis=0)]
-        for three in ((0, 1, 2), (0, 2, 3))
-    ]
-    triangles = np.concatenate(faces)
+    corners = np.stack(
+        [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1
+    )
+    triangles = np.concatenate([corners[..., three] for three in ([0, 1, 2], [0, 2, 3])])
+    triangles = triangles[known.ravel()[triangles].all(axis=-1)]
     if not len(triangles):
         return
     flat = points.reshape(-1, 3)
@@ -199,16 +179,17 @@ def _send_box(sent: Entities, box: Box) -> None:
     foot = [[x[0], y[0], z[0]], [x[1], y[0], z[0]], [x[1], y[1], z[0]], [x[0], y[1], z[0]]]
     lines = [[*foot, foot[0]], [foot[0], [x[0], y[0], z[1]]]]
     sent.still("surface/axes", rr.LineStrips3D(lines, colors=(150, 150, 150), radii=0.004))
-    places, texts = [], []
-    for share in (0.0, 0.5, 1.0):
-        turn = box.gamma[0] + share * (box.gamma[1] - box.gamma[0])
-        places.append([x[0] + share * SIDES[0], y[0] - 0.12, z[0]])
-        texts.append(f"{turn / math.pi:.2g} π" if share != 0.5 else "gamma")
-        away = box.distance[0] + share * (box.distance[1] - box.distance[0])
-        places.append([x[1] + 0.12, y[0] + share * SIDES[1], z[0]])
-        texts.append(f"{away:.2g} a" if share != 0.5 else "distance of the grips")
-    for share in (0.5, 1.0):
-        places.append([x[0] - 0.08, y[0], z[0] + share * SIDES[2]])
-        texts.append(f"U = {share * box.ceiling:.3g}")
-    points = rr.Points3D(places, labels=texts, radii=0.001, colors=PALE, show_labels=True)
+    turn, away = (
+        [f"{low:.2g} {unit}", name, f"{high:.2g} {unit}"]
+        for (low, high), unit, name in (
+            ((box.gamma[0] / math.pi, box.gamma[1] / math.pi), "π", "gamma"),
+            (box.distance, "a", "distance of the grips"),
+        )
+    )
+    heights = [f"U = {share * box.ceiling:.3g}" for share in (0.5, 1.0)]
+    places = [[x[0] + share * SIDES[0], y[0] - 0.12, z[0]] for share in (0.0, 0.5, 1.0)]
+    places += [[x[1] + 0.12, y[0] + share * SIDES[1], z[0]] for share in (0.0, 0.5, 1.0)]
+    places += [[x[0] - 0.08, y[0], z[0] + share * SIDES[2]] for share in (0.5, 1.0)]
+    look: dict[str, Any] = {"radii": 0.001, "colors": PALE, "show_labels": True}
+    points = rr.Points3D(places, labels=[*turn, *away, *heights], **look)
     sent.still("surface/values", points)

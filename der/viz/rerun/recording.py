@@ -1,15 +1,15 @@
 """A path as a recording for the rerun viewer, in a file or served while the path is solved.
 
-A recording is made in memory, column by column, once the path is known, and written
-atomically. The main timeline is `step`, the steps of the motion; since gamma turns back at folds,
-`gamma_mdeg` (millidegrees) is the second one.
+A recording is made in memory, column by column, when the path is known. The file is written
+atomically. The main timeline is `step`, the steps of the motion. The second one is `gamma_mdeg`
+(millidegrees), which turns back at folds.
 """
 
 from __future__ import annotations
 
 import hashlib
 import socket
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
@@ -24,9 +24,17 @@ from der.viz.animation import Motion, animate
 from der.viz.captions import about
 from der.viz.files import checked_suffix, write
 from der.viz.rerun.axes import HIGH, PlotAxes, send_axes, send_labels
-from der.viz.rerun.blueprint import SOLVING, UNDER, beside, landscape_layout, layout, while_solving
+from der.viz.rerun.blueprint import (
+    CURVES,
+    SOLVING,
+    UNDER,
+    beside,
+    landscape_layout,
+    layout,
+    while_solving,
+)
 from der.viz.rerun.curves import send_curve, send_events, send_key, send_series
-from der.viz.rerun.entities import PAIR, VERMILION, Entities, send_ring
+from der.viz.rerun.entities import PAIR, VERMILION, Entities, closed, send_ring
 from der.viz.rerun.landscape import send_landscape, send_surface
 from der.viz.resampling import in_step, one_or_two
 from der.viz.titles import names
@@ -72,23 +80,17 @@ def save_landscape(landscape: Landscape, file: FilePath, *, surface: Surface | N
     checked_suffix("rrd", file, [SUFFIX])
     path = landscape.path
     motion = animate(path)
-    stream = _stream(_identity(path, motion), names([path])[0])
-    memory = stream.memory_recording()
-    stream.send_blueprint(
-        landscape_layout(motion, well=_has_well(landscape), surface=surface is not None)
-    )
-    sent = Entities(stream, motion)
-    send_ring(sent)
-    send_key(sent)
-    send_landscape(sent, landscape)
-    if surface is not None:
-        send_surface(sent, surface)
-    send_series(sent, path)
-    send_events(sent, path)
-    _send_about(sent, about(path, motion))
-    content = memory.drain_as_bytes()
-    stream.disconnect()
-    write("rrd", file, content)
+
+    def send(stream: rr.RecordingStream) -> None:
+        has_well = landscape.barriers.open is not None and landscape.barriers.saddle is not None
+        stream.send_blueprint(landscape_layout(motion, well=has_well, surface=surface is not None))
+        sent = Entities(stream, motion)
+        send_landscape(sent, landscape)
+        if surface is not None:
+            send_surface(sent, surface)
+        _send_motion(sent, path)
+
+    write("rrd", file, _recorded([path], [motion], send))
 
 
 def recording_bytes(path: Path | Sequence[Path], *, rest: Array | None = None) -> bytes:
@@ -96,24 +98,15 @@ def recording_bytes(path: Path | Sequence[Path], *, rest: Array | None = None) -
     paths = one_or_two(path)
     if len(paths) == 1:
         motion = animate(paths[0], rest=rest)
-        stream = _stream(_identity(paths[0], motion), names(paths)[0])
-        memory = stream.memory_recording()
-        _send(stream, paths[0], motion)
-    else:
-        motions = in_step(paths, STEPS)
-        both = "".join(_identity(p, motion) for p, motion in zip(paths, motions, strict=True))
-        stream = _stream(hashlib.sha256(both.encode()).hexdigest()[:32], " and ".join(names(paths)))
-        memory = stream.memory_recording()
-        _send_both(stream, paths, motions)
-    content = memory.drain_as_bytes()
-    stream.disconnect()
-    return content
+        return _recorded(paths, [motion], lambda stream: _send(stream, paths[0], motion))
+    motions = in_step(paths, STEPS)
+    return _recorded(paths, motions, lambda stream: _send_both(stream, paths, motions))
 
 
 class Live:
-    """A recording that is served for watching while the path is solved; a context.
+    """A recording that is served while the path is solved; a context.
 
-    `show` gives it the states one by one, on a timeline of their own; `finish` all of the path.
+    `show` adds the states one by one, on their own timeline; `finish` adds the complete path.
 
     Raises
     ------
@@ -132,13 +125,12 @@ class Live:
     def show(self, x: Array) -> None:
         """Show the vertices (N, 3) of the next state."""
         self._stream.set_time(SOLVING, sequence=self._shown)
-        closed = np.append(x, x[:1], axis=0).astype(np.float32)
-        line = rr.LineStrips3D([closed], colors=VERMILION, radii=0.03)
+        line = rr.LineStrips3D([closed(x).astype(np.float32)], colors=VERMILION, radii=0.03)
         self._stream.log(SOLVING, line, strict=True)
         self._shown += 1
 
     def finish(self, path: Path) -> None:
-        """Show all of a path; errors as in `animate`."""
+        """Show the complete path; errors as in `animate`."""
         motion = animate(path)
         self._stream.reset_time()
         self._stream.send_recording_name(names([path])[0])
@@ -148,7 +140,7 @@ class Live:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stream.flush()  # else the server complains of what it could not send
+        self._stream.flush()  # else the server reports data that it could not send
         self._stream.disconnect()
 
 
@@ -164,25 +156,39 @@ def _check_free(port: int) -> None:
             raise ValueError(f"port must be free, got {port}: {problem.strerror}") from problem
 
 
-def _stream(identity: str, name: str) -> rr.RecordingStream:
-    """An empty recording, named after what it will show."""
+def _recorded(
+    paths: Sequence[Path],
+    motions: Sequence[Motion],
+    send: Callable[[rr.RecordingStream], None],
+) -> bytes:
+    """The bytes of a recording to which ``send`` adds the contents, named after the paths."""
+    identity = _identity(paths, motions)
     stream = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
     stream.set_log_time_enabled(False)
-    stream.send_recording_name(name)
-    return stream
+    stream.send_recording_name(" and ".join(names(paths)))
+    memory = stream.memory_recording()
+    send(stream)
+    content = memory.drain_as_bytes()
+    stream.disconnect()
+    return content
 
 
 def _send(stream: rr.RecordingStream, path: Path, motion: Motion) -> None:
-    """Send all of a motion, its layout first."""
+    """Send the layout and the contents of a motion with its curves."""
     stream.send_blueprint(layout(motion))
     sent = Entities(stream, motion)
+    for name in CURVES:
+        send_curve(sent, path, name)
+    _send_motion(sent, path)
+
+
+def _send_motion(sent: Entities, path: Path) -> None:
+    """Send the ring, its series and events, and what is shown."""
     send_ring(sent)
     send_key(sent)
-    send_curve(sent, path, "moment")
-    send_curve(sent, path, "energy")
     send_series(sent, path)
     send_events(sent, path)
-    _send_about(sent, about(path, motion))
+    _send_about(sent, about(path, sent.motion))
 
 
 def _send_both(
@@ -198,11 +204,9 @@ def _send_both(
     ]
     common = Entities(stream, motions[0], top=top)
     send_key(common)
-    for name in ("moment", "energy"):
-        gamma, heights = (
-            np.concatenate([getattr(path, n) for path in paths]) for n in ("gamma", name)
-        )
-        axes = PlotAxes(gamma, heights)
+    gamma = np.concatenate([path.gamma for path in paths])
+    for name in CURVES:
+        axes = PlotAxes(gamma, np.concatenate([getattr(path, name) for path in paths]))
         send_axes(common, f"curves/{name}", axes)
         for k, (sent, path, colour) in enumerate(zip(both, paths, PAIR, strict=True)):
             send_curve(sent, path, name, axes=axes, colour=colour)
@@ -212,14 +216,13 @@ def _send_both(
         send_ring(sent)
         send_series(sent, path, name=name, colour=colour)
         send_events(sent, path, name=name)
-    texts = [about(path, motion) for path, motion in zip(paths, motions, strict=True)]
-    _send_about(common, "\n\n".join([BESIDE, *texts]))
+    _send_about(common, "\n\n".join([BESIDE, *map(about, paths, motions)]))
 
 
 BESIDE = (
-    "Both rings are turned together: wherever there are two states of equal gamma they are shown "
-    "together; where one turns back or snaps, the other waits. Between the states of a path the "
-    "rings are drawn on a spline through them."
+    "Both rings are twisted together: two states of equal gamma are shown at the same step. Where "
+    "one ring turns back or snaps, the other waits. Between the states of a path the rings are "
+    "drawn on a spline through them."
 )
 
 
@@ -227,19 +230,11 @@ def _send_about(sent: Entities, text: str) -> None:
     sent.still("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
 
-def _has_well(landscape: Landscape) -> bool:
-    return landscape.barriers.open is not None and landscape.barriers.saddle is not None
-
-
-def _identity(path: Path, motion: Motion) -> str:
-    """A recording id that depends on what is shown, and not on when."""
-    digest = hashlib.sha256(about(path, motion).encode())
-    for array in (
-        motion.x,
-        motion.frames,
-        motion.gamma,
-        motion.moment,
-        motion.energy,
-    ):
-        digest.update(np.ascontiguousarray(array).tobytes())
+def _identity(paths: Sequence[Path], motions: Sequence[Motion]) -> str:
+    """A recording id that depends on the contents, and not on the time."""
+    digest = hashlib.sha256()
+    for path, motion in zip(paths, motions, strict=True):
+        digest.update(about(path, motion).encode())
+        for array in (motion.x, motion.frames, motion.gamma, motion.moment, motion.energy):
+            digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:32]
