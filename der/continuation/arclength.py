@@ -41,6 +41,8 @@ def follow(
 
     Raises
     ------
+    ValueError
+        For limits of an observable that the system does not have.
     ContinuationFailed
         Where the path cannot be continued, after everything that was found has been handed out.
     """
@@ -65,6 +67,10 @@ class _Path(Generic[S]):
             raise ContinuationFailed(
                 f"the start, {self._place(at)}, is no equilibrium: {at.advice}", Reason.NO_START
             )
+        unknown = [name for name in self.events.limits if name not in at.observables]
+        if unknown:
+            known = ", ".join(at.observables)
+            raise ValueError(f"limits must be observables ({known}), got {unknown[0]!r}")
         return at
 
     def points(self, start: Solution[S]) -> Iterator[Point[Any]]:

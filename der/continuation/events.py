@@ -73,7 +73,7 @@ class Events(Generic[S]):
             first, last = math.floor(least / self.spacing), math.ceil(most / self.spacing)
             multiples = (k * self.spacing for k in range(first, last + 1))
             values |= {value for value in multiples if least <= value <= most}
-        return sorted(values - {low}, reverse=high < low)
+        return sorted(values - {low}, reverse=bool(high < low))
 
 
 def regular(

@@ -57,10 +57,17 @@ def supported(
     Raises
     ------
     ValueError
-        Where an edge turns that is not clamped: its frame would be both free and prescribed; or
-        where one turns that lengthens, too.
+        For an edge that the rod does not have, or forces of another shape; where an edge turns that
+        is not clamped: its frame would be both free and prescribed; or where one turns that
+        lengthens, too.
     """
     n = rod.n_edges
+    for name, edges in (("clamped", clamped), ("turn", turn or {}), ("reach", reach or {})):
+        for j in edges:
+            if not 0 <= j < n:
+                raise ValueError(f"{name} must name edges from 0 to {n - 1}, got {j!r}")
+    if pull is not None and np.shape(pull) not in ((3,), (n, 3)):
+        raise ValueError(f"pull must have the shape (3,) or ({n}, 3), got {np.shape(pull)}")
     free = np.ones((n, rod.block), dtype=bool)
     free[list(clamped)] = False
     rates = np.zeros(n)

@@ -103,9 +103,18 @@ class RodSystem:
         Raises
         ------
         ValueError
-            For a closed rod whose edge 0 is free (`supports.check_cut`).
+            For a closed rod whose edge 0 is free (`supports.check_cut`), a configuration of another
+            rod, or another ``hold``.
         """
         check_cut(self.rod, self.supports.free)
+        if hold not in _CLOSING:
+            raise ValueError(f"hold must be one of {', '.join(_CLOSING)}, got {hold!r}")
+        sizes = self.rod.n_edges, len(self.supports.target)
+        if (len(guess.quat), len(guess.force)) != sizes:
+            raise ValueError(
+                f"guess must have {sizes[0]} edges and {sizes[1]} multipliers of position"
+                f" conditions, got {len(guess.quat)} and {len(guess.force)}"
+            )
         if value is not None and hold == PARAMETER and value != guess.load:
             turned = self.retract(guess, self.increment(load=value - guess.load))
             guess = turned.but(load=float(value))

@@ -1,6 +1,7 @@
 """Open rods under dead loads, followed with events by the public API alone."""
 
 import numpy as np
+import pytest
 
 import der
 
@@ -33,3 +34,32 @@ def test_a_compressed_cantilever_buckles_at_euler_s_load():
     assert branch.kind == "branch"
     assert branch.sides == ((0,), (1,))
     np.testing.assert_allclose(branch.solution.parameter, np.pi**2 / 4.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (
+            lambda rod: der.supported(rod, clamped=(9,)),
+            "clamped must name edges from 0 to 4, got 9",
+        ),
+        (lambda rod: der.supported(rod, pull=np.ones(2)), r"pull must have the shape \(3,\) or"),
+        (lambda rod: of(rod).correct(der.straight(rod), hold="torque"), "hold must be one of"),
+        (lambda rod: of(rod).correct(der.straight(rod, 3)), "guess must have 5 edges and 0 mult"),
+        (lambda rod: follow(rod, limits=("work",)), "limits must be observables .*, got 'work'"),
+    ],
+)
+def test_wrong_arguments_are_named(wrong, message):
+    """The argument, the value and what is allowed; nothing reaches a kernel."""
+    with pytest.raises(ValueError, match=message):
+        wrong(der.discrete_rod(np.full(4, 0.25), np.zeros(4), (1.0, 1.0, 1.0)))
+
+
+def of(rod):
+    """A clamped rod."""
+    return der.RodSystem(rod, der.supported(rod, clamped=(0,)))
+
+
+def follow(rod, **wants):
+    """Its path, however short."""
+    return list(der.follow(of(rod), der.straight(rod), der.Events(**wants)))
