@@ -1,4 +1,4 @@
-"""The scene: a ring, its section, and what is asked of it. No kernels."""
+"""A scene: a ring, its section, and how its path is computed. No kernels."""
 
 from __future__ import annotations
 
@@ -23,40 +23,40 @@ _STATED = (("ring", Ring, "circle()"), ("section", Section, "rectangular_section
 
 FEWEST_EDGES = 8
 MOST_EDGES = 65_536
-THINNEST = 1e6  # a/t; beyond, EA drowns bending in rounding
+THINNEST = 1e6  # a/t; above it, rounding of EA hides bending
 CROSSINGS_UP_TO = 1024  # edges; the writhe that finds self-crossings costs O(N^2)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A ring to be folded by twisting, and what is wanted of its path.
+    """A ring that is folded by twisting, and how its path is computed.
 
     Parameters
     ----------
     ring : the closed planar shape with its grips, from `circle` and its like.
     section : stiffness ratios, from `rectangular_section` or `section`.
     n_edges : edges of the full ring; even, and divisible by 4 where a quarter is solved.
-    sector : the piece to march on: "full", "half", "quarter", or "auto", the smallest that the
-        ring's symmetry allows.
+    sector : the symmetry sector that is solved: "full", "half", "quarter", or "auto", the smallest
+        that the ring has.
     stability : whether to compute the index of the full ring at every state.
     self_crossings : whether to look for states where the ideal curve passes through itself; None:
         up to 1024 edges. (Its old name, ``contacts``, is accepted with a DeprecationWarning.)
-    error_bars : whether to solve on a half and a quarter of the edges, too, and to extrapolate:
-        the path then holds extrapolated values with their errors. From 32 edges on, divisible by
-        16 on a quarter and by 8 otherwise.
+    error_bars : whether to solve on N/2 and N/4 edges, too, and to extrapolate. The path then holds
+        extrapolated values with their errors. N must be at least 32, and divisible by 16 on a
+        quarter, by 8 otherwise.
     shapes : whether to keep vertices and frames of every state.
-    history : with shapes, whether to keep how the ring falls in each snap, too.
-    modes : with shapes, whether to compute the softest mode of each symmetry at every state.
-    control : "arclength" follows the path of equilibria through its folds; "angle" turns the grips
-        and "moment" raises a dead moment: the state is then a minimum, and where it ceases to be
-        one the ring snaps.
-    unload : with angle or moment control, come back to gamma = 0 afterwards. A dead moment is
+    history : whether to keep how the ring moves in each snap; needs ``shapes``.
+    modes : whether to compute the softest mode of each symmetry at every state; needs ``shapes``.
+    control : "arclength" follows the path of equilibria through its folds. "angle" turns the grips,
+        "moment" raises a dead moment: each state is then a minimum, and the ring snaps where the
+        minimum ends.
+    unload : with angle or moment control, return to gamma = 0 afterwards. A dead moment is
         lowered from that of the ring at ``gamma_max``, through 0 where the folded ring is stable,
         and the ring ends where gamma stops at 0.
     solver : "newton", or "relaxation": the march of the angle by dynamic relaxation alone.
     gamma_max : the path ends at its first arrival there [rad].
-    until : "folded": go on, beyond pi and back, until the three-covered state at pi is reached;
-        ``gamma_max`` then only ends the path where it is above pi.
+    until : "folded": the path ends at the three-covered state at pi, even if it first passes pi
+        and turns back; ``gamma_max`` then ends it only where it is above pi.
     save_at : values of gamma at which states are solved for [rad]; None: multiples of pi/8.
     curvature : measure of curvature, one of `MEASURES`.
     stretch : "inextensible", or "finite": EA = 12 EI1 (a_over_t / a)^2, a rectangular section's.
@@ -197,7 +197,7 @@ Scene.__init__ = _accepting_contacts(Scene.__init__)  # type: ignore[method-assi
 
 
 def sector_name(ring: Ring, name: str, n_edges: int) -> str:
-    """The sector meant by ``name``, after checking that the ring has it and the edges divide.
+    """The sector that ``name`` means; checks that the ring has it, and that the edges divide.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Experiments made of the engine: one file each, runnable, each a test."""
+"""Numerical experiments: each is one file that can be run, and a test."""

@@ -1,9 +1,9 @@
 """The h/t above which a folded ring is stable: in its grips, at fixed moment, when released.
 
 The planar three-covered shape does not depend on the section, and its forces are proportional to
-EI1. So one shape of a ring serves every h/t, and each index, and the slope dM/dgamma, is a function
-of h/t whose last change of sign is a threshold: stable above. Releasing a ring frees what the grips
-held, so its index is never below that at fixed moment.
+EI1. So the shape is computed once for every h/t. Each index, and the slope dM/dgamma, is then a
+function of h/t. Above its last change of sign, the threshold, the state is stable. The released
+ring has more freedom, so that its index is never below that at fixed moment.
 
     python -m scenarios.folded_stability [--out DIR] [--quick]
 
@@ -46,7 +46,7 @@ class Folded:
 
     @classmethod
     def of(cls, ring: der.Ring, n_edges: int = EDGES, h_over_t: float = 4.0) -> Folded:
-        """The state that twisting reaches at ``h_over_t``; of a D2 ring the only one there is.
+        """The state that twisting reaches at ``h_over_t``; for a D2 ring it is the only one.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Folded:
         """Index at fixed moment."""
         return self.index(h_over_t) + (self.slope(h_over_t) < 0.0)
 
-    def alone(self, h_over_t: float) -> tuple[der.RodSystem, State]:
+    def released(self, h_over_t: float) -> tuple[der.RodSystem, State]:
         """The released ring, and the state with the forces that close it."""
         section = der.rectangular_section(h_over_t)
         own = gripped_ring(self.ring, section, self.n_edges)
@@ -108,13 +108,13 @@ class Folded:
 
     def index_free(self, h_over_t: float) -> int:
         """Index of the released ring."""
-        free, state = self.alone(h_over_t)
+        free, state = self.released(h_over_t)
         count = free.index(state)
-        return -1 if count is None else count  # at a threshold, to rounding
+        return -1 if count is None else count  # unknown at a threshold, to rounding
 
     def softest_free(self, h_over_t: float, count: int = 3) -> list[float]:
         """Stiffnesses nearest to zero of the released ring [GJ/a^2]."""
-        free, state = self.alone(h_over_t)
+        free, state = self.released(h_over_t)
         return free.softest_modes(state, count)[0].tolist()
 
 
@@ -130,9 +130,9 @@ def _evenly_bent(ring: der.Ring, gripped: GrippedRing) -> State:
 
 
 def threshold(is_stable: Callable[[float], bool]) -> float | None:
-    """The h/t above which a state is stable; None where it never is, 0 where it always is.
+    """The h/t above which a state is stable; None: never stable, 0: always.
 
-    The last change in a scan, then bisection.
+    The last change in a scan is refined by bisection.
     """
     ratios = np.geomspace(SLENDEREST, FLATTEST, SCAN)
     high = None
@@ -151,7 +151,7 @@ def threshold(is_stable: Callable[[float], bool]) -> float | None:
     return 0.5 * (low + high)
 
 
-JUDGES: dict[str, Callable[[Folded, float], bool]] = {
+CRITERIA: dict[str, Callable[[Folded, float], bool]] = {
     "slope": lambda ring, h_over_t: ring.slope(h_over_t) > 0.0,
     "index": lambda ring, h_over_t: ring.index(h_over_t) == 0,
     "index_moment": lambda ring, h_over_t: ring.index_moment(h_over_t) == 0,
@@ -160,11 +160,11 @@ JUDGES: dict[str, Callable[[Folded, float], bool]] = {
 
 
 def thresholds(ring: der.Ring, n_edges: int = EDGES) -> dict[str, float | None]:
-    """Thresholds of h/t by name of the judge."""
+    """Thresholds of h/t by the name of the criterion."""
     state = Folded.of(ring, n_edges)
     return {
-        name: threshold(lambda h_over_t, judge=judge: judge(state, h_over_t))  # type: ignore[misc]
-        for name, judge in JUDGES.items()
+        name: threshold(lambda h_over_t, stable=stable: stable(state, h_over_t))  # type: ignore[misc]
+        for name, stable in CRITERIA.items()
     }
 
 
@@ -201,12 +201,12 @@ def main() -> None:
     rows: list[list[object]] = []
     for family, parameter, ring in rings(quick=asked.quick):
         coarse, fine = (thresholds(ring, n_edges) for n_edges in (EDGES // 2, EDGES))
-        limit = {name: extrapolated(coarse[name], fine[name]) for name in JUDGES}
+        limit = {name: extrapolated(coarse[name], fine[name]) for name in CRITERIA}
         for n_edges, found in ((EDGES // 2, coarse), (EDGES, fine), ("extrapolated", limit)):
             rows.append([family, f"{parameter:.6g}", n_edges, *found.values()])
         words = ", ".join(f"{name} {_word(value)}" for name, value in limit.items())
         print(f"{family} {parameter:.4g}: {words}", flush=True)
-    write_table(asked.out / "thresholds.csv", ["family", "parameter", "n_edges", *JUDGES], rows)
+    write_table(asked.out / "thresholds.csv", ["family", "parameter", "n_edges", *CRITERIA], rows)
     print(f"written to {asked.out}")
 
 

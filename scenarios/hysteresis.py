@@ -3,7 +3,7 @@
 The rings are those of `der figure hysteresis`, which draws the loops. Three claims are checked:
 
     loop      4 times the loop integral of M dgamma is what the snaps release together
-    landing   every snap ends in a state of the path of equilibria, which is followed by arc length
+    landing   every snap ends in a state of the path of equilibria, followed by arclength
     folds     every snap begins at one of its folds
 
     python -m scenarios.hysteresis [DIR]
@@ -27,7 +27,7 @@ def table() -> str:
     """Folds, end states of snaps, and energies in a few lines of text."""
     rows = [
         f"{'':14}{'gamma':>9}{'M before':>10}{'M after':>10}{'released':>10}"
-        f"{'to the path':>13}  lands after"
+        f"{'to the path':>13}  ends after"
     ]
     for one in loops.values():
         for landing in one.landings:

@@ -23,7 +23,7 @@ if __name__ == "__main__":
     usage(__file__, __doc__)
 
 H_OVER_T = np.geomspace(1.0, 30.0, 40)
-BESIDE = (3.55, 3.6, 3.7, 3.8)  # sections beside the threshold, from which it is extrapolated
+BESIDE = (3.55, 3.6, 3.7, 3.8)  # sections near the threshold, which is extrapolated from them
 
 one = der.landscape(der.Scene(der.circle(), der.rectangular_section(8.0), error_bars=True))
 curves = barriers_over(der.circle(), H_OVER_T)

@@ -1,11 +1,11 @@
 """Opening a folded ring with the least work: circle and ellipse, b/a = 0.6, h/t = 4.
 
 A strut or a pair of couples that loads the ring slowly does at least the work of the barrier of the
-released ring. It does just that where it leads to the saddle without a snap. For a circle, this is
-a strut between two strands that lie in each other, a third of the ring apart: it lifts one off the
-other. For an ellipse, couples at the ends of the long axis turn against each other, across the line
-between them. A dead load does less work until the ring snaps open: 0.0037 of 0.0211 GJ/a where a
-circle is squeezed along a diameter of its folded shape.
+released ring. It does exactly that work if it leads to the saddle without a snap. For a circle, a
+strut does so between two strands that lie in each other, a third of the ring apart: it lifts one
+off the other. For an ellipse, couples at the ends of the long axis turn against each other, across
+the line between them. A dead load does less work until the ring snaps open: 0.0037 of 0.0211 GJ/a
+where a circle is squeezed along a diameter of its folded shape.
 
     python -m scenarios.landscape_push [DIR]
 
@@ -29,8 +29,8 @@ if __name__ == "__main__":
 N_EDGES = 48
 SECTION = der.rectangular_section(4.0)
 
-rests, alone, twisting, _ = twisted_rests(der.Scene(der.circle(), SECTION, n_edges=N_EDGES))
-lift = struts(alone[-1], (0, N_EDGES // 3))[0]
+rests, free_rings, twisting, _ = twisted_rests(der.Scene(der.circle(), SECTION, n_edges=N_EDGES))
+lift = struts(free_rings[-1], (0, N_EDGES // 3))[0]
 lifted = opened(lift, rests[-1].energy, ALIKE * rests[-1].energy)
 
 if __name__ == "__main__":
@@ -43,13 +43,13 @@ if __name__ == "__main__":
             slow, dead = found.pushes[found.least[kind]], found.pushes[found.least_dead[kind]]
             print(
                 f"{ring.shape}, {kind}: {slow.direction} at {slow.points}, "
-                f"work {slow.held.work:.6f} on the mesh, {value:.6f} +- {error:.0e} without; "
+                f"work {slow.held.work:.6f} on the mesh, {value:.6f} +- {error:.0e} extrapolated; "
                 f"barrier {found.barrier:.6f}"
             )
             if dead.dead is not None:
                 value, error = found.extrapolated.get(f"{kind} dead", (math.nan, math.nan))
                 print(
                     f"  dead: {dead.direction} at {dead.points}, load {dead.dead.load:.5f}, work "
-                    f"{dead.dead.work:.6f} on the mesh, {value:.6f} +- {error:.0e} without"
+                    f"{dead.dead.work:.6f} on the mesh, {value:.6f} +- {error:.0e} extrapolated"
                 )
     print(f"written to {place}")

@@ -1,9 +1,9 @@
-"""Fold 500 random rings under every control, and list the paths that end without explanation.
+"""Fold 500 random rings under every control, and list the paths that end early.
 
 Rings and sections are drawn from the ranges of the paper's phase diagrams. Their paths are followed
-by arclength, loaded and unloaded by the angle, and loaded by a dead moment. A path may end early
-because of what the ring does: a mode breaks the symmetry that the sector keeps, or gamma turns back
-and the path leads to -pi. Any other early end is a defect of the solver. The energy of paths
+by arclength, loaded and unloaded by the angle, and loaded by a dead moment. The ring itself can end
+a path early: a mode breaks the symmetry of the sector, or gamma turns back and the path leads to
+-pi. Any other early end is a defect of the solver. The energy of paths
 followed by arclength is also compared with the work done, the integral of 4 M dgamma.
 
     python -m scenarios.random_folds [--count N] [--seed N] [--edges N] [--out DIR]
@@ -31,7 +31,7 @@ WAYS: dict[str, dict[str, object]] = {
     "angle, up and down": {"control": "angle", "unload": True},
     "moment": {"control": "moment"},
 }
-# what the ring does, and not that the solver has failed
+# ends that are caused by the ring, and not by the solver
 ANSWERS = (der.Reason.BREAKS_SYMMETRY.word, der.Reason.TURNED_BACK.word)
 LOOSE = 1e-3  # of U: what the work between states is known to by interpolation
 DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt
@@ -40,7 +40,7 @@ DENSE = 256  # states from 0 to pi where the path's own leave the work in doubt
 def random_rings(count: int, seed: int) -> Iterator[tuple[der.Ring, der.Section]]:
     """Rings and sections, uniform over the ranges of figures 2, 3, 5 and 8; circles in log h/t.
 
-    nu is uniform from 0 to 0.5, and its ends and 0.3 have their turns too.
+    nu is uniform from 0 to 0.5, or one of 0, 0.3 and 0.5.
     """
     random = np.random.default_rng(seed)
     for _ in range(count):
@@ -66,7 +66,7 @@ def random_rings(count: int, seed: int) -> Iterator[tuple[der.Ring, der.Section]
 
 @dataclass(frozen=True)
 class Stop:
-    """A path that did not end as it should."""
+    """A path that ended early."""
 
     way: str
     ring: der.Ring
@@ -84,7 +84,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Tried:
-    """What became of the rings."""
+    """The results of all rings."""
 
     count: int
     stops: tuple[Stop, ...]

@@ -1,9 +1,9 @@
-"""Whether rings that fold stably on a symmetric path are stable in three dimensions, too.
+"""Compare stability on a symmetric path with stability in three dimensions, for folded rings.
 
-The paper follows a quarter or a half of the ring, which breaks no symmetry, and calls a folded ring
-stable where dM/dgamma > 0. Here every curve of the paper and the planes of profile and section
-around them are followed with the index of the full ring. Each ring is also loaded by the angle, so
-that it snaps where it has to. Four ways of being wrong are looked for:
+The paper computes a quarter or a half of the ring, which keeps its symmetry, and calls a folded
+ring stable where dM/dgamma > 0. Here every curve of the paper, and the planes of profile and
+section around them, are computed with the index of the full ring. Each ring is also loaded by the
+angle, so that it snaps. Four kinds of disagreement are counted:
 
     a  a state that loading by the angle reaches is unstable in the grips
     b  the folded state is unstable at fixed moment, although its slope is positive
@@ -49,7 +49,7 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Case:
-    """A ring to be folded, and where it stands in the survey."""
+    """A ring to be folded, and its place in the survey."""
 
     family: str
     parameter: float
@@ -59,7 +59,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What one path says; None where it is not known."""
+    """The results of one ring; None where they are not known."""
 
     family: str
     parameter: float
@@ -83,7 +83,7 @@ class Verdict:
 
     @property
     def colour(self) -> str:
-        """Name of the verdict in the picture."""
+        """The name of its colour in the picture."""
         if self.status != "done":
             return "stuck"
         if not self.foldable:
@@ -228,7 +228,7 @@ def write(verdicts: list[Verdict], folder: File) -> None:
 
 
 def draw(verdicts: list[Verdict], file: File) -> None:
-    """One panel for each family, profile against h/t; open marks are a, b and d."""
+    """Axes for each family, profile over h/t; open marks are a, b and d."""
     from der.paper.canvas import page, save
 
     families = list(dict.fromkeys(verdict.family for verdict in verdicts))
@@ -236,19 +236,19 @@ def draw(verdicts: list[Verdict], file: File) -> None:
     rows = -(-len(families) // columns)
     figure = page(3.3 * columns, 2.9 * rows + 0.5)
     for k, family in enumerate(families):
-        panel = figure.add_subplot(rows, columns, k + 1)
+        axes = figure.add_subplot(rows, columns, k + 1)
         for name, colour in COLOURS.items():
             these = [v for v in verdicts if v.family == family and v.colour == name]
             x, y = [v.parameter for v in these], [v.h_over_t for v in these]
-            panel.scatter(x, y, s=16, color=colour, marker="s", label=name)
+            axes.scatter(x, y, s=16, color=colour, marker="s", label=name)
         for letter, (marker, label) in MARKS.items():
             these = [v for v in verdicts if v.family == family and letter in v.wrong]
             x, y = [v.parameter for v in these], [v.h_over_t for v in these]
-            panel.scatter(x, y, s=46, facecolor="none", edgecolor="k", marker=marker, label=label)
-        panel.set_title(family.rpartition(", ")[0] or family, fontsize=9)
-        panel.set_xlabel(family.rpartition(", ")[2], fontsize=8)
-        panel.set_ylabel("h/t", fontsize=8)
-        panel.tick_params(labelsize=7)
+            axes.scatter(x, y, s=46, facecolor="none", edgecolor="k", marker=marker, label=label)
+        axes.set_title(family.rpartition(", ")[0] or family, fontsize=9)
+        axes.set_xlabel(family.rpartition(", ")[2], fontsize=8)
+        axes.set_ylabel("h/t", fontsize=8)
+        axes.tick_params(labelsize=7)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncols=4, fontsize=8, frameon=False)
     figure.tight_layout(rect=(0.0, 0.5 / (2.9 * rows + 0.5), 1.0, 1.0))

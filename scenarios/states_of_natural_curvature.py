@@ -1,10 +1,10 @@
 r"""The states of a circular ring, free in space, over its natural curvature: h/t = 2.
 
-A rod of natural curvature kappa0 is bent to a ring of curvature 1. It may lie flat, be two-covered
-or three-covered, be turned inside out or lie in a figure eight, at any kappa0. All are states, with
-the energies pi alpha (n - kappa0)^2 of n covers and that of a planar elastica. Their index changes
-at thresholds that are known in closed form (`continuum_index`); the states in space between them
-are not, and are found.
+A rod of natural curvature kappa0 is bent to a ring of curvature 1. At any kappa0 it has the states
+flat, two-covered, three-covered, inside out and figure eight. n covers have the energy
+pi alpha (n - kappa0)^2, the figure eight that of a planar elastica. Their index changes at
+thresholds that are known in closed form (`continuum_index`). States in space between them have no
+closed form, and are searched for.
 
     python -m scenarios.states_of_natural_curvature [DIR]
 
@@ -34,8 +34,8 @@ H_OVER_T = 2.0
 SPAN = (0.0, 4.0)  # of the natural curvature
 COVERS = (1, 2, 3)
 SCAN = 33  # natural curvatures between which thresholds are sought
-EXACT = 1e-9  # a bisection's last bracket
-SHOWN = (0.0, 1.0, 2.0, 3.0)  # natural curvatures of which all is drawn
+EXACT = 1e-9  # last bracket of a bisection
+SHOWN = (0.0, 1.0, 2.0, 3.0)  # natural curvatures whose states are drawn
 
 bar = der.rectangular_section(H_OVER_T)
 
@@ -66,7 +66,7 @@ def continuum_index(n: int, kappa0: float, alpha: float, beta: float) -> int:
 
 
 def index_on_mesh(n: int, kappa0: float, n_edges: int = 64) -> int:
-    """The same of the discrete ring; at a threshold, by the signs of the pivots alone."""
+    """The index of the discrete ring, by the signs of the pivots only."""
     free = covered(gripped_ring(der.circle(kappa0), bar, n_edges, name="full"), n)
     return free.unpinned.count(free.state, "all")
 

@@ -1,16 +1,15 @@
-"""Does it matter how a ring falls? Relaxed, in a viscous fluid, and swinging: from ten folds.
+"""Does the motion of a snap matter? Relaxed, overdamped and inertial motion from ten folds.
 
-At a fold the ring loses its stability and falls to another equilibrium. Which one might depend on
-the motion. Here each fall is computed in three ways, all begun by the same kick along the fold's
-softest mode:
+At a fold the ring loses its stability and snaps to another equilibrium. The motion could decide to
+which one. Here each snap is computed in three ways, from the same kick along the softest mode:
 
     relax   dynamic relaxation, stopped at every peak of kinetic energy (what `der.fold` uses)
     flow    overdamped: down the gradient, by implicit steps in time
     move    inertial: lightly damped, the ring swings dozens of times before it rests
 
-With the grips held all three land in one state, on the path of equilibria, and a minimum in three
-dimensions. Under a dead moment they need not: an ellipse that swings passes over the state in which
-it would come to rest without inertia (`overshoot`).
+With the grips held, all three end in one state, which is on the path of equilibria and a minimum in
+three dimensions. Under a dead moment they can differ: an ellipse that swings passes the state in
+which it comes to rest without inertia (`overshoot`).
 
     python -m scenarios.three_ways_to_fall [DIR]
 
@@ -50,7 +49,7 @@ REQUEST = Request(self_crossings=False)
 
 @dataclass(frozen=True)
 class Fall:
-    """One fall and where it ended."""
+    """A snap and its end state."""
 
     ring: str
     gamma: float  # of the fold, rad
@@ -60,20 +59,20 @@ class Fall:
     moment: float  # there, of one arm, GJ/a
     energy: float  # there, of the full ring, GJ/a
     index: tuple[int | None, ...]  # there, by symmetry class
-    apart: float  # from where the relaxed ring lands: largest rotation of an edge, rad
+    apart: float  # from the end state of the relaxed ring: largest rotation of an edge, rad
     cost: str
     seconds: float
 
 
 def _kick(ring: GrippedRing, at: Equilibrium, *, load: bool) -> Increment:
-    """The displacement with which a fall begins."""
+    """The displacement with which a snap begins."""
     kick = ring.displacement(at.tangent, KICK)
     kick[-1] *= load
     return kick
 
 
 def _falls(name: str) -> Iterator[Fall]:
-    """Falls from both folds of a ring that is loaded and unloaded by the angle."""
+    """Snaps from both folds of a ring that is loaded and unloaded by the angle."""
     shape, h_over_t = RINGS[name]
     ring = gripped_ring(shape, der.rectangular_section(h_over_t), EDGES)
     for point in follow_angle(ring, REQUEST, Statistics(), unload=True):
@@ -109,7 +108,7 @@ def _cost(found: Relaxed | EndState) -> str:
 
 
 def _overshoot() -> dict[str, float]:
-    """Where an ellipse goes from its first limit of the dead moment: gamma by way of falling.
+    """Where an ellipse snaps to from its first limit of the dead moment: gamma by kind of motion.
 
     b/a = 0.85 about y, h/t = 4. Those that pass a stop at pi end at the folded ring, whose own
     moment, 0, is below the dead one: it stays there.
@@ -143,7 +142,7 @@ overshoot = _overshoot()
 
 
 def table() -> str:
-    """Where the rings land, and what it costs to compute."""
+    """The end states, and the cost of computing them."""
     rows = [
         f"{'':14}{'from gamma':>11}  {'way':6}{'M':>11}{'U':>12}{'index':>7}{'apart':>9}"
         f"{'time':>9}  cost"

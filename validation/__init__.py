@@ -1,4 +1,4 @@
-"""The evidence: rod against boundary-value problem against other codes; benchmark and stress test.
+"""The evidence: rod, boundary-value problem and other codes compared; benchmark and stress test.
 
     python -m validation benchmark|stress     from a clone
 

@@ -3,7 +3,7 @@
     python -m validation benchmark [--quick] [--only PARTS] [--json F] [--out DIR]
     python -m validation stress [--quick | --long] [--workers N] [--seed N] [--json F]
 
-`der bench` and `der stress` do the same where the clone is the current folder.
+`der bench` and `der stress` do the same in the folder of a clone.
 """
 
 from __future__ import annotations

@@ -18,18 +18,18 @@ from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 PLACE = ("b_over_a", "r_over_a", "vertex_angle", "natural_curvature", "h_over_t")
-FINE = 32  # a chord is then 1/1024 as far off as that of an interval
+FINE = 32  # pieces of an interval: a chord is then 1/1024 as far off as that of the interval
 Row = Mapping[str, str]
 Lines = Mapping[str, list[Array]]  # points (n, 5) of curves, in units of the sides, by kind
 
 
 def case_of(row: Row) -> str:
-    """What tells a case from the others."""
+    """The parameters of a case as text."""
     return " ".join(row[name] for name in ("shape", "twist_axis", *PLACE, "nu"))
 
 
 def place_of(row: Row) -> list[float]:
-    """Where a row is in the diagram; 0 for what its shape has not."""
+    """The place of a row in the diagram; 0 for parameters that its shape does not have."""
     return [float(row[name] or 0.0) for name in PLACE]
 
 

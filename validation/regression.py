@@ -4,11 +4,11 @@
     python -m validation.regression dump new                  # after it, by this checkout
     python -m validation.regression compare old new           # 0: they agree; 3: they do not
 
-`dump` writes a JSON record a case, GROUP/CASE.json, in a Python process of the checkout's own, and
-goes on where it was stopped. Only public names are used, so that old commits can be asked too.
-`compare` judges states at gammas that were asked for, special points, the state at pi, errors,
-indices, modes and statuses; of diagrams the labels, boundaries as curves, and corners. Not judged:
-states where steps happen to end, times, sentences, and entries that only new records have.
+`dump` writes a JSON record for each case, GROUP/CASE.json, in a Python process that imports the
+other checkout, and resumes where it was stopped. It uses public names only, which old commits have.
+`compare` checks the states at gammas that were asked for, special points, the state at pi, errors,
+indices, modes and statuses; of diagrams the labels, boundaries as curves, and corners. It does not
+check states at the ends of steps, times, sentences, and entries that only new records have.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ def solved(ring: Maker, h_over_t: float, how: Any = None, **more: Any) -> Any:
 
 
 def landscape(words: str) -> Any:
-    """What a command writes."""
+    """The record that a command writes."""
     with tempfile.TemporaryDirectory() as folder:
         file = File(folder) / "record.json"
         command = ["-m", "der", "landscape", *words.split(), "--quiet", "--json", str(file)]
@@ -224,8 +224,8 @@ def entries(make: Callable[[], Any]) -> Any:
 # --- Compare ---------------------------------------------------------------------------------
 
 CLOSE = 1e-9  # of the largest value of a column
-LEAST = 1e-3  # in place of that value where it is smaller: such a column is all rounding
-CONTACT = 1e-5  # likewise, where strands pass through each other: such points are bisected to that
+LEAST = 1e-3  # least value used for it: a smaller column is rounding
+CONTACT = 1e-5  # likewise, for self-crossings, which are bisected to that
 BARS = 0.1  # of an estimated error, where it changes by more than CLOSE
 CORNER = 1e-7  # of the sides of a diagram
 CURVE = 2e-5  # likewise; see `validation.boundaries`
@@ -240,7 +240,7 @@ Leaf = tuple[Any, str, bool]  # a value, its column, and whether it is an error 
 
 
 class Found(NamedTuple):
-    """How far an entry is from what it was, how far it may be, and in words."""
+    """The change of an entry, the largest change allowed, and both in words."""
 
     kind: str  # one of SIZES, or "other" for what may not differ at all
     size: float  # of the column's largest value; of the old error; of the diagram's sides
@@ -249,7 +249,7 @@ class Found(NamedTuple):
 
 
 def compare(old: File, new: File, groups: Sequence[str]) -> int:
-    """Print a table of what the new records make of the old ones, and the cases that differ."""
+    """Print how much the new records differ from the old ones, and which cases differ too much."""
     lines, total = [], 0
     print("group      cases  equal" + "".join(f"{kind:>10}" for kind in SIZES))
     for group in [old / name for name in groups if (old / name).is_dir()]:
@@ -270,7 +270,7 @@ def compare(old: File, new: File, groups: Sequence[str]) -> int:
 
 
 def judged(old_file: File, new_file: File) -> Iterator[Found]:
-    """What became of every entry of a record."""
+    """The change of every entry of a record."""
     if not new_file.exists():
         yield Found("other", math.inf, 0.0, "there is no such new record")
         return
@@ -294,7 +294,7 @@ def judged(old_file: File, new_file: File) -> Iterator[Found]:
 
 
 def judged_leaf(place: str, old: Leaf, new: Leaf | None, scale: float) -> Found:
-    """What became of one entry; ``scale`` is the largest value of its column."""
+    """The change of one entry; ``scale`` is the largest value of its column."""
     was, now = old[0], None if new is None else new[0]
     words = f"{place} was {was!r}, is {'missing' if new is None else repr(now)}"
     if not (isinstance(was, float) and isinstance(now, float)):
@@ -309,7 +309,7 @@ def judged_leaf(place: str, old: Leaf, new: Leaf | None, scale: float) -> Found:
 def leaves(
     entry: Any, place: str = "", column: str = "", bar: bool = False
 ) -> Iterator[tuple[str, Leaf]]:
-    """All that is in an entry and judged, by place; of lists their lengths, too."""
+    """Every value of an entry that is checked, by place, and the lengths of lists."""
     if isinstance(entry, dict):
         for name in [name for name in entry if name not in NOT_JUDGED]:
             own = name.removesuffix("_error").removesuffix("_at_pi")
@@ -343,7 +343,7 @@ def asked(record: dict[str, Any]) -> dict[str, Any]:
 
 
 def judged_diagram(old: dict[str, Any], new: dict[str, Any]) -> Iterator[Found]:
-    """What became of the labels, boundaries and corners of a diagram."""
+    """The changes of labels, boundaries and corners of a diagram."""
     from validation.boundaries import case_of, lines_of, off_lines, place_of
 
     sides = np.ptp([place_of(row) for row in old["cases"]], axis=0)
@@ -362,7 +362,7 @@ def judged_diagram(old: dict[str, Any], new: dict[str, Any]) -> Iterator[Found]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do what is asked for; the exit code."""
+    """Run the command; the exit code."""
     parser = argparse.ArgumentParser(
         "regression", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -388,7 +388,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if wanted.here:
         dump(wanted)
         return 0
-    # a process that sees neither this checkout nor the folder that it is started in
+    # a process that imports neither this checkout nor the folder that it is started in
     alone = {"PYTHONPATH": str(wanted.tree.resolve()), "PYTHONSAFEPATH": "1"}
     env = os.environ | alone | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     command = [sys.executable, __file__, *given, "--here"]

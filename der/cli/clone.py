@@ -1,6 +1,6 @@
-"""Commands that run the evidence of a clone: `bench` and `stress`.
+"""The commands `bench` and `stress`, which need a clone of the repository.
 
-The wheel has no evidence in it. In a clone these commands do what `python -m validation` does.
+In the folder of a clone they do what `python -m validation` does; the wheel has no such module.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The command `der`: the list of its commands, and how it ends.
 
 Exit codes: 0 done; 2 bad input, in one line that names the option, the value and what is allowed;
-3 not converged, with the last good state saved and named; 130 stopped by Ctrl-C, likewise saved.
+3 not converged, 130 stopped by Ctrl-C: the path up to its last good state is saved and named.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _show_version(wanted: bool) -> None:
 def _top(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Say the version."),
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
     """Discrete elastic rods for rings that fold by twisting."""

@@ -1,6 +1,6 @@
 """Options for files, and the files themselves, checked before the work begins.
 
-Every command has its own set of these options; `targets` turns any of them into files by option.
+Every command has its own group of them; `targets` turns any group into files by option.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class PathFiles:
     json: str | None = file_option("Write the record here ('-': output).")
     plot: str | None = file_option("Draw the path: .png, .pdf or .svg.")
     rrd: str | None = file_option("Record for playback with rerun: .rrd.")
-    movie: str | None = file_option("Film it: .gif, or .mp4 (needs ffmpeg).")
+    movie: str | None = file_option("Animate it: .gif, or .mp4 (needs ffmpeg).")
     html: str | None = file_option("A page to scrub in any browser: .html.")
     beside: str | None = folder_option("Show the ring of this --out DIR, too, where it moves.")
     out: str | None = folder_option("Write path.json, path.png and shapes.npz here.")

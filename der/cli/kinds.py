@@ -1,6 +1,6 @@
-"""How each kind of record is told on the terminal, and what is written of it: one table.
+"""What is printed and written of each kind of record: one table.
 
-What a kind needs is imported when a record of it is written.
+Modules that draw a kind of record are imported when one is drawn.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _together(module: str, save: str) -> Moving:
 
 
 def _play(found: Any, along: Callable[[], Any] | None, file: File) -> None:
-    """Record a landscape; a surface with the landscape along its path, which is found now."""
+    """Record a landscape, or a surface with the landscape along its path, computed now."""
     from der.viz.rerun.recording import save_landscape
 
     if along is None:

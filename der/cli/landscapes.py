@@ -37,7 +37,7 @@ class LandscapeOptions:
         return lambda tick: der.landscape(scene, progress=tick)
 
     def check(self, path: PathOptions, files: LandscapeFiles) -> None:
-        """Refuse options that a landscape of this kind would not look at."""
+        """Refuse options that have no effect on a landscape of this kind."""
         given = {
             "--two-dimensional": self.two_dimensional,
             "--free": self.free,

@@ -1,4 +1,4 @@
-"""Records and what is drawn of them go to files and to standard output; nothing found is lost."""
+"""Writes records and pictures to files and to standard output, so that no result is lost."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from der.records.path import Path
     from der.utils.files import Saved
 
-UNSAVED = File("der-unfinished.json")  # where what is unfinished goes if no file was named
+UNSAVED = File("der-unfinished.json")  # for an unfinished record, if no file was named
 OUTPUT = File("-")  # standard output
 DRAWN = ("plot", "rrd", "html", "movie")  # the quick ones first
 
@@ -42,7 +42,7 @@ def show(text: str) -> bool:
 
 
 def keep_somewhere(targets: Targets) -> None:
-    """Name files for the record and its shapes where there are none: what is found is kept."""
+    """Name files for the record and its shapes where the user has named none."""
     file = targets.setdefault("json", [UNSAVED])[-1]
     targets.setdefault("shapes", [(UNSAVED if file == OUTPUT else file).with_suffix(".npz")])
 
@@ -66,10 +66,10 @@ def whereabouts(path: Path, targets: Targets) -> str:
 
 
 def deliver(record: Saved, targets: Targets, writers: Writers) -> int:
-    """Write the record first, then what is drawn of it; say what could not be; the exit code.
+    """Write the record first, then its pictures, name what could not be written; the exit code.
 
-    A record that can be written nowhere goes to standard output, also in ``targets``, and one that
-    nobody wanted is kept where Ctrl-C stops the drawing: nothing already computed is lost.
+    A record that no file takes goes to standard output, which ``targets`` then names. Where Ctrl-C
+    stops the drawing, a record without a file is saved, too.
     """
     from der.utils.interrupts import interrupts_between_states
 

@@ -14,7 +14,7 @@ from der.cli.run import Tick, keep_showing, over_gamma, run, served
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """Watching."""
+    """How to watch the ring while it is computed."""
 
     live: bool = option("Serve what --rrd records for watching, until Ctrl-C.", False)
     port: int = option("Where --live serves.", 9876)
@@ -63,7 +63,7 @@ def bvp(ring: RingOptions, path: PathOptions, files: PathFiles) -> int:
 
 
 def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int:
-    """Hold the rod against the boundary-value problem, state by state, with their error bars."""
+    """Compare the rod with the boundary-value problem, state by state, with their error bars."""
     with options_named():
         from der.bvp.solve import TOLERANCE, check
 
@@ -74,5 +74,5 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
     def solve(tick: Tick) -> der.Comparison:
         return der.compare(scene, progress=tick)
 
-    # the files named are a comparison's: a path that is left on the way goes elsewhere
+    # the files named are for a comparison: an unfinished path goes to a file of its own
     return run(solve, written, bar=over_gamma(scene), partial={}, quiet=files.quiet)[1]

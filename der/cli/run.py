@@ -1,4 +1,4 @@
-"""The run loop of the terminal: a record is found under a progress bar, written, and told."""
+"""Runs a solver under a progress bar, writes its record, and prints the summary."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def counted(what: str, most: int) -> Bar:
 
 @contextmanager
 def _progress(bar: Bar | None, *, quiet: bool) -> Iterator[Tick]:
-    """What moves a progress bar on standard error, where that is a terminal."""
+    """A progress bar on standard error, where that is a terminal: what moves it."""
     if bar is None or quiet or not sys.stderr.isatty():
         yield None
         return
@@ -107,7 +107,7 @@ def _progress(bar: Bar | None, *, quiet: bool) -> Iterator[Tick]:
 
 
 def served(port: int) -> Live:
-    """What is watched while it is made; its address is told."""
+    """A recording that can be watched while it is made; prints its address."""
     from der.viz.rerun.recording import Live
 
     live = Live(port)
@@ -119,6 +119,6 @@ def keep_showing(live: Live, path: Path) -> None:
     """Serve the complete path until Ctrl-C."""
     with suppress(KeyboardInterrupt):
         live.finish(path)
-        say("der: the film can be watched until Ctrl-C")
+        say("der: the recording can be watched until Ctrl-C")
         while True:
             time.sleep(3600.0)

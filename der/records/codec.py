@@ -2,7 +2,7 @@
 
 cattrs builds the nested objects and keeps the place of what is wrong; the entries themselves are
 checked by the objects, and written by `der.records.entries.plain`. cattrs is imported when
-something is read, since that takes as long as the rest of a record.
+something is read, because importing it takes as long as everything else.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Kind = TypeVar("Kind", bound=Checked)
 
 
 class _Misplaced(ValueError):
-    """A value that cannot stand where it stands; the message goes on after the place."""
+    """A value of the wrong kind; its message follows the name of its place."""
 
 
 def record_of(kind: type[Kind], values: Any) -> Kind:

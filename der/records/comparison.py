@@ -1,4 +1,4 @@
-"""The record of a rod's path beside that of its boundary-value problem; free of kernels."""
+"""The comparison of a rod's path with that of the boundary-value problem; free of kernels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ComparedState(Checked):
     bvp_moment: Number
     bvp_energy: Number
     moment_distance: Number  # normal distance in (gamma/pi, M/max|M|)
-    moment_bar: Number | None  # allowed there: the rod's error bars, and the other's tolerance
+    moment_bar: Number | None  # allowed distance: error bars of the rod, and tolerance of the other
     energy_distance: Number
     energy_bar: Number | None
 

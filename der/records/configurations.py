@@ -1,6 +1,6 @@
-"""The full ring at every state of a path, and what a playback shows besides.
+"""The shapes of a ring at every state of a path, its motion in snaps, and its softest modes.
 
-Free of kernels, like the record that they belong to; they are saved by themselves, as npz.
+Free of kernels, like the record of the path. They are saved in a file of their own, as npz.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Fall:
     Raises
     ------
     ValueError
-        If a shape is another or a value is not finite.
+        If an array has a wrong shape, or a value is not finite.
     """
 
     after: int  # position in the path of the state that it leaves
@@ -51,7 +51,7 @@ class Softest:
     Raises
     ------
     ValueError
-        If a shape is another or a value is not finite.
+        If an array has a wrong shape, or a value is not finite.
     """
 
     classes: tuple[str, ...]  # (m,) names
@@ -83,7 +83,7 @@ class Shapes:
     Raises
     ------
     ValueError
-        If a shape is another or a value is not finite, or a fall leaves a state that is not there.
+        If an array has a wrong shape, a value is not finite, or a snap starts from no state.
     """
 
     x: Array

@@ -1,6 +1,6 @@
 """What the entries of a record may hold, declared with their types.
 
-The type of a field carries its check, and how it is written where that is not as it is:
+The type of a field holds its check, and how the entry is written:
 
     gamma: Column                                       finite numbers, (n,)
     index: Count | None                                 an integer >= 0, or null
@@ -33,7 +33,7 @@ class Entry:
     Parameters
     ----------
     check : takes name and value; returns the value in its proper type, or raises ValueError.
-    write : the value as JSON has it.
+    write : turns the value into JSON's types.
     dims : for every dimension the name of an entry of the same length, the length, or None.
     """
 
@@ -64,7 +64,7 @@ class Checked:
             object.__setattr__(self, name, entry.check(name, value))
 
     def _check_lengths(self, name: str, value: Any, dims: Dims) -> None:
-        """Refuse another length than ``dims`` says; what has no length, its check refuses."""
+        """Refuse a length that ``dims`` does not allow; without a length, the check refuses it."""
         dim = dims[0]
         wanted = len(getattr(self, dim)) if isinstance(dim, str) else dim
         if not isinstance(value, Sequence | np.ndarray):
@@ -87,7 +87,7 @@ class Checked:
 
 
 def plain(value: Any) -> Any:
-    """An object as JSON has it: a dict of its entries."""
+    """An object in JSON's types: a dict of its entries."""
     if not isinstance(value, Checked):
         return value
     kind: Any = type(value)
@@ -119,7 +119,7 @@ def entries_of(kind: type) -> dict[str, Entry]:
 
 
 def entry_of(hint: Any) -> Entry | None:
-    """How something of a type is checked; None for what is checked by itself, such as a record."""
+    """How values of a type are checked; None for objects that check themselves, such as records."""
     inner = get_args(hint)
     if get_origin(hint) is Annotated:
         return next((one for one in inner if isinstance(one, Entry)), None)

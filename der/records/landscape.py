@@ -58,11 +58,11 @@ def _kind(index: object) -> str:
 
 @dataclass(frozen=True)
 class Barriers(Checked):
-    """What it costs to get from one well into the other over the highest saddle between them."""
+    """Energies from one well to the other, over the highest saddle between them."""
 
     fold: Number | None  # that saddle above the flat ring
     open: Number | None  # above the folded ring
-    saddle: Count | None  # which of the rests it is
+    saddle: Count | None  # position of that saddle in `rests`
     why: Texts = field(default_factory=dict)  # a sentence where one is None, or special
 
 
@@ -73,9 +73,9 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
     JOINED: ClassVar[str] = "path"
     _KNOWN: ClassVar[dict[str, Any]] = {"solver": "der", "at_pi": None, "mode": None, "error": None}
 
-    path: Path  # stable and unstable branches, all rests among its states
+    path: Path  # stable and unstable branches, with all M = 0 states
     rests: tuple[Rest, ...]  # in path order: the flat ring first
-    folded: Truth  # whether the last rest is the planar three-covered ring
+    folded: Truth  # whether the last M = 0 state is the planar three-covered ring
     barriers: Barriers  # on the scene's own mesh
     extrapolated: Estimates = field(default_factory=dict)
     # with error bars, extrapolated values and errors: of the barriers "fold" and "open", of
@@ -89,7 +89,7 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
                 raise ValueError(f"rests[{i}].position is {there}")
 
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
-        """The entries of the path, but for those that are always the same, and the others."""
+        """The entries of the path, without those that never differ, and the other entries."""
         path = entries.pop("path")
         first = {name: path[name] for name in _OF_PATH}
         last = {"why": entries["barriers"].pop("why"), "extrapolated": entries.pop("extrapolated")}
@@ -105,7 +105,7 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
         return own | {"path": {"schema": 1} | cls._KNOWN | entries}
 
     def facts(self) -> list[str]:
-        """How many rests, and the barrier to open."""
+        """How many states with M = 0, and the barrier to open."""
         known = self.barriers.open
         barrier = "no barrier to open" if known is None else f"barrier to open {known:.6g}"
         return [f"{len(self.rests)} states with M = 0", barrier]
@@ -132,12 +132,12 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
 
     @property
     def wells(self) -> tuple[Rest, ...]:
-        """Rests that are minima while the grips turn freely."""
+        """States with M = 0 that are minima while the grips turn freely."""
         return tuple(rest for rest in self.rests if rest.kind == "well")
 
     @property
     def saddles(self) -> tuple[Rest, ...]:
-        """The other rests."""
+        """The other states with M = 0."""
         return tuple(rest for rest in self.rests if rest.kind == "saddle")
 
 
@@ -158,7 +158,7 @@ class Saddle(Checked):
     residual: Number  # largest force left, GJ/a
     zero_modes: Count  # beyond rigid motions: 1 where material may shift along the ring at no cost
     twisted: Truth  # whether it is the saddle on the path of twisting itself
-    ends: tuple[Text, ...]  # "flat", "folded" or another rest, on the two sides
+    ends: tuple[Text, ...]  # "flat", "folded" or another M = 0 state, on the two sides
     stiffness: Number  # of the unstable mode: its eigenvalue, GJ/a^2
 
 

@@ -1,4 +1,4 @@
-"""What it takes to push a folded ring open; free of kernels.
+"""Forces and couples that open a folded ring; free of kernels.
 
 Energies and works are those of the full ring in GJ/a, lengths in a, forces in GJ/a^2, couples in
 GJ/a, angles in radians.
@@ -45,7 +45,7 @@ Positions = Annotated[Mapping[str, int], Entry(_positions)]
 
 @dataclass(frozen=True)
 class Instant(Checked):
-    """When a push has done its work: where the ring is released, or a dead load gets away."""
+    """The end of a push: where the ring is released, or snaps away under a dead load."""
 
     event: Annotated[str, one_of(tuple(EVENTS))]
     push: Number  # by how much the strut has changed its length [a], or the wrench has turned [rad]
@@ -54,12 +54,12 @@ class Instant(Checked):
     energy: Number  # of the ring above the folded one
     index_before: Count | None  # unstable modes before it, in the actuator; None: not known
     index_after: Count | None  # and after; at a pass those of the free ring
-    lands: Text  # "flat", "folded" or another rest, once it is released; "" where it is not
+    lands: Text  # end state after release: "flat", "folded" or another; "": not released
 
 
 @dataclass(frozen=True, eq=False)
 class Push(Checked):
-    """One way of pushing, and what it comes to."""
+    """A push at two points of the ring, and its result."""
 
     kind: Annotated[str, one_of(KINDS)]
     points: Annotated[tuple[float, float], numbers(2)]  # s/L, from the first grip
@@ -79,7 +79,7 @@ class Push(Checked):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class LeastPush(Record, name="least push", kind="push", plot="opening"):
-    """The ways of pushing a folded ring open that were tried, and the one of least work."""
+    """The pushes at a folded ring that were tried, and that of least work."""
 
     status: Status
     why: Text  # a sentence where there is none

@@ -115,7 +115,7 @@ class Path(Record, name="path", plot="path"):
     OPTIONAL: ClassVar[tuple[str, ...]] = ("status", "message", "reason", "raw")
 
     solver: Annotated[str, one_of(SOLVERS)]
-    status: Status = "done"  # what there is of an incomplete path is good
+    status: Status = "done"  # the states of an incomplete path are good
     message: Text = ""  # a sentence about the status
     reason: Annotated[str, one_of(REASONS)] = ""  # why it ended: `word` of a der.errors.Reason
     ring: Json  # the statement, as in its JSON form
@@ -225,7 +225,7 @@ def folding_mode(
         raise ValueError(f"gamma never reaches pi, only {np.max(gamma, initial=0.0)!r}")
     kinds = {point.kind for point in points if point.position <= arrived[0]}
     foldable = three_covered and abs(at_pi.moment) <= NO_MOMENT * float(np.abs(moment).max())
-    if kinds & {"fold", "snap"}:  # by dynamic relaxation alone a snap is seen, and no fold
+    if kinds & {"fold", "snap"}:  # dynamic relaxation sees the snap, and no fold
         snapping = "snap-back"
     elif "limit" in kinds:
         snapping = "snap-through"
@@ -241,7 +241,7 @@ def folding_mode(
 
 @cache
 def release() -> str:
-    """The package's version: looking it up reads a file."""
+    """The version of the package, looked up once, because that reads a file."""
     try:
         return version("ring-origami")
     except PackageNotFoundError:  # run from a source tree that was never installed

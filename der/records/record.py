@@ -1,7 +1,7 @@
 """What every record can do: be saved and loaded, drawn, and shown in a line or a small table.
 
-A record names the module that draws it by text; it is imported when the record is drawn: so
-reading a file loads no matplotlib, and this package imports nothing of `der.viz`.
+A record has the name of the module that draws it, which is imported when the record is drawn: to
+read a file loads no matplotlib, and this package imports nothing of `der.viz`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Status = Annotated[str, one_of(STATUSES)]
 
 @dataclass(frozen=True)
 class SolveTime(Checked):
-    """What the answer cost."""
+    """What a solve has cost."""
 
     solve_s: Number
 

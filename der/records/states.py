@@ -44,7 +44,7 @@ class Transition(Checked):
     """The end state of a state that is pushed along one of its unstable modes."""
 
     start: Text
-    end: Text | None  # a minimum; None: it came to no rest
+    end: Text | None  # a minimum; None: no end state was reached
     stiffness: Number  # eigenvalue of the mode pushed along, GJ/a^2, < 0
     sign: Integer  # of the push
     via: tuple[Text, ...]  # saddles where its symmetry held it, until it was perturbed
@@ -94,7 +94,7 @@ class States(RingRecord, name="states of a ring", kind="states", plot="states"):
 
     @property
     def minima(self) -> tuple[RingState, ...]:
-        """The states in which a ring stays."""
+        """The stable states."""
         return tuple(state for state in self.states if state.stable)
 
     def falls_to(self, name: str) -> tuple[str, ...]:

@@ -363,12 +363,12 @@ def test_landscape_over_twist_and_distance():
     assert np.all(sheet.count == 1)
 
 
-def test_landscape_left_alone():
+def test_landscape_free_ring():
     """0.010682 GJ/a open the folded ellipse, a sixtieth of what twisting shows.
 
     The limits are those of 128 and 256 edges, extrapolated; 64 edges leave 2.5e-5 of the second.
     """
-    from scenarios.landscape_left_alone import found, twisted
+    from scenarios.landscape_free_ring import found, twisted
 
     value, error = found.extrapolated["open"]
     assert value == pytest.approx(0.010682, abs=3e-6)

@@ -222,7 +222,7 @@ def test_stretch_leaves_the_unstable_mode(ring, h_over_t, a_over_t):
     section = der.rectangular_section(h_over_t)
     stretching = 12.0 * section.alpha * a_over_t**2
     full = gripped_ring(ring, section, 64, name="full", stretching=stretching)
-    stiff, start = Folded.of(ring, 64, h_over_t).alone(h_over_t)
+    stiff, start = Folded.of(ring, 64, h_over_t).released(h_over_t)
     assert stiff.index(start) == 1
     free = RodSystem(full.rod, free_supports(full.rod))
     at = free.correct(start)
@@ -239,7 +239,7 @@ def test_a_ring_left_alone_unfolds_to_flat(ring, h_over_t):
     """
     for above in (False, True):
         h = 8.0 if above else h_over_t
-        free, state = Folded.of(ring, 64).alone(h)
+        free, state = Folded.of(ring, 64).released(h)
         at = free.correct(state)
         stiffness, modes = free.softest_modes(state, 3)
         mode = modes[int(np.argmin(stiffness))]

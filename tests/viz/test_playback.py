@@ -219,7 +219,7 @@ def test_live_serves_until_ctrl_c(tmp_path):
         try:
             lines = [live.stderr.readline(), live.stderr.readline()]
             assert f"rerun rerun+http://127.0.0.1:{port}/proxy" in lines[0]
-            assert lines[1] == "der: the film can be watched until Ctrl-C\n"
+            assert lines[1] == "der: the recording can be watched until Ctrl-C\n"
             socket.create_connection(("127.0.0.1", port), timeout=5).close()
             live.send_signal(signal.SIGINT)
             assert live.wait(timeout=20) == 0

@@ -1,4 +1,4 @@
-"""What others measured, elsewhere: a table of its own beside `der bench`, and no part of it."""
+"""Times of other codes, measured elsewhere; printed after the benchmark in a table of their own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CITED = {
 
 
 def cited() -> str:
-    """What others measured, in a table of its own."""
+    """The table of these times."""
     lines = [f"\ncited, {CITED['source']}:"]
     figures: list[dict[str, object]] = CITED["figures"]  # type: ignore[assignment]
     for figure in figures:

@@ -1,12 +1,12 @@
-"""The same ring by PyElastica (a Cosserat rod in explicit dynamics), where that is installed.
+"""The ring by PyElastica, a Cosserat rod in explicit dynamics, where that is installed.
 
-A closed ring of n straight elements, two of them the grips: their frames and the transverse places
-of their nodes are prescribed, along the axis they slide. The grips turn at a constant rate and are
-held until the damped ring is at rest. Statics do not depend on mass, inertia or damping, so these
-are chosen for speed: inertia of the section so large that its own frequencies do not limit the
-time step, damping near critical for the slowest mode. Stretch and shear are stiff, of a ring with
-a/t = 30 instead of 200, which allows steps nearly 7 times longer and is 2e-5 of M; the error
-of the discretisation is larger at every n used.
+The closed ring has n straight elements, and two of them are the grips: their frames and the
+transverse positions of their nodes are prescribed, and they slide along the axis. The grips turn at
+a constant rate and are held until the damped ring is at rest. Statics do not depend on mass,
+inertia or damping, so these are chosen for speed. The inertia of the section is so large that its
+own frequencies do not limit the time step, and the damping is near critical for the slowest mode.
+Stretch and shear are those of a ring with a/t = 30 instead of 200. That allows time steps nearly 7
+times longer and changes M by 2e-5; the error of discretisation is larger at every n used.
 
 Source: Gazzola, Dudte, McCormick, Mahadevan (2018), R. Soc. Open Sci. 5, 171628; PyElastica, PyPI.
 """
@@ -24,9 +24,9 @@ import der
 from der.bvp.gauss import Array
 
 A_OVER_T = 30.0
-INERTIA = 0.4  # a, the radius of the disk that the section's inertia is that of
+INERTIA = 0.4  # a, radius of a disk with the inertia of the section
 DAMPING = 2.0  # 1/T, T = a^2 sqrt(mass per length / GJ)
-RAMP = 10.0  # T, over which the grips turn
+RAMP = 10.0  # T, time in which the grips turn
 REST = 1e-6  # a/T: no node moves faster once the ring is at rest
 PATIENCE = 200.0  # T
 COURANT = 0.9
@@ -78,7 +78,7 @@ def _ring(section: der.Section, n: int, gamma: float, step: float) -> tuple[Any,
     parts: Any = (elastica.BaseSystemCollection, elastica.Constraints, elastica.Damping)
 
     class Collection(*parts):  # type: ignore[misc]
-        """What PyElastica steps."""
+        """The system that PyElastica steps."""
 
     places, frames = _polygon(n)
     ring = elastica.CosseratRod.ring_rod(
@@ -125,7 +125,7 @@ def _polygon(n: int) -> tuple[Array, Array]:
 
 
 def _grip() -> type:
-    """The constraint class of a grip; made when used, for its base is PyElastica's."""
+    """The constraint class of a grip; it is made here because its base is PyElastica's."""
     import elastica
 
     class Grip(elastica.ConstraintBase):  # type: ignore[misc]
@@ -170,7 +170,7 @@ def _place(x, frames, edge, angle, half, frame):
 
 @njit(cache=True)
 def _stop(velocity, omega, edge):
-    """Take the velocities from a grip, but for that along the axis."""
+    """Set the velocities of a grip to zero, except that along the axis."""
     for k in range(3):
         omega[k, edge] = 0.0
     for k in range(2):
@@ -178,13 +178,13 @@ def _stop(velocity, omega, edge):
 
 
 def _forces(collection: Any) -> None:
-    """Internal forces and couples of the configuration as it is."""
+    """Compute internal forces and couples of the present configuration."""
     for system in collection.final_systems():
         system.compute_internal_forces_and_torques(0.0)
 
 
 def _moment(ring: Any, collection: Any, n: int) -> float:
-    """Half of what the ring does to its grips about the axis, the mean of the two."""
+    """Half of the moment of the ring on a grip about the axis, mean of both grips."""
     _forces(collection)
     total = 0.0
     for edge, sign in ((0, 1.0), (n // 2, -1.0)):

@@ -1,4 +1,4 @@
-"""How much the benchmark measures: all of it, or the quick selection."""
+"""How much the benchmark measures: everything, or a quick selection."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Extent:
     """How much is measured; the defaults are the complete benchmark."""
 
     repeats: int = 5
-    slow_repeats: int = 3  # of what takes seconds
+    slow_repeats: int = 3  # of methods that take seconds
     rings: tuple[BenchRing, ...] = RINGS
     states: int = 400  # of the reference, over 0 to pi; 256 are enough for 1e-9
     edges: tuple[int, ...] = (16, 32, 64, 128, 256, 512, 1024)
@@ -25,7 +25,7 @@ class Extent:
     swept: int = 1000
     sample: int = 40
     commands: int = 5
-    cold: bool = True  # also what compiling takes
+    cold: bool = True  # also measure the time of compiling
 
 
 FULL = Extent()

@@ -13,7 +13,7 @@ from validation.benchmark.rows import Attempt, Trial, front_text
 from validation.benchmark.stepping import stepped
 
 RELAXATION, BOUNDARY_VALUE, STEPPING = (
-    "dynamic relaxation",  # the march of the angle, which snaps where the path folds
+    "dynamic relaxation",  # the angle is turned; the ring snaps where the path folds
     "boundary value",
     "solve_bvp, stepped",
 )
@@ -38,7 +38,7 @@ def attempts(
 
     Parameters
     ----------
-    scene : of the ring, given what else is wanted.
+    scene : makes the scene of the ring with further entries.
     rods : the variants of the rod.
     """
 

@@ -1,11 +1,10 @@
-"""What each need of a scene costs, over the same path without it: CPU time and memory.
+"""The cost of each need of a scene, relative to the same path without it: CPU time and memory.
 
-A need is what may be asked for or left out. A ring that stays in its plane needs no twist: its rows
-compare the rod with one unknown an edge and the rod in space, on the states of one path. Where a
-ring leaves its plane, twist cannot be left out, because a frame turns about three axes. Neither can
-anisotropy: its rows say that a section with two stiffnesses costs what one with a single stiffness
-does. Memory is what is asked of the system: a history reserves room for the longest snap there can
-be, most of it never touched.
+A need is an entry of the scene that can be left out. A ring that stays in its plane needs no twist:
+its rows compare the rod with one unknown an edge with the rod in space, on the states of one path.
+A ring that leaves its plane cannot do without twist, because a frame turns about three axes. It
+cannot do without anisotropy either: its rows show that two stiffnesses cost as much as one. Memory
+is what is allocated: a history reserves space for the longest possible snap, and uses little of it.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ Wants = dict[str, object]
 KEPT: Wants = {"shapes": True}
 TURNED: Wants = {"control": "angle", "unload": True}
 
-# name -> (h/t, what is wanted besides, what it is compared with)
+# name -> (h/t, entries of the scene, entries of the scene that it is compared with)
 NEEDS: Mapping[str, tuple[float, Wants, Wants]] = {
     "stability of every state": (4.0, {"stability": True}, {}),
     "self-crossings": (4.0, {"self_crossings": True}, {}),
@@ -76,7 +75,7 @@ def _added(seconds: float, memory: int) -> str:
 
 
 def _outputs(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
-    """What showing and storing a path costs, over folding it: files are left out, disks differ."""
+    """The cost of drawing and encoding a path, relative to folding it; no files are written."""
     from der.viz.plots.path import draw
     from der.viz.rerun.recording import recording_bytes
 
@@ -94,7 +93,7 @@ def _outputs(repeats: int, seconds: float, n_edges: int) -> Iterator[Row]:
 
 
 def _sections(repeats: int, n_edges: int) -> Iterator[Row]:
-    """Anisotropy, per Newton iteration: the section alone differs, and with it the path."""
+    """Anisotropy, per Newton iteration: only the section differs, and with it the path."""
     for name, section in (
         ("anisotropic", der.rectangular_section(4.0)),
         ("isotropic", der.section(1.0, 1.0)),

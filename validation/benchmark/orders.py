@@ -26,8 +26,8 @@ from validation.benchmark.rows import Row
 
 NAMES = ("plain, h^2", "Richardson, h^4", "Romberg, h^6")
 ORDERS = (2.0, 4.0, 6.0)
-TRUSTED = 10.0  # floors of the reference: errors closer to it than this are not fitted
-PLACES = 8  # multiples of pi/PLACES, and the folds, are what is compared: the same for every N
+TRUSTED = 10.0  # times the floor of the reference; errors below that are not fitted
+PLACES = 8  # multiples of pi/PLACES are compared, and the folds: the same for every N
 
 
 class Level(NamedTuple):
@@ -83,7 +83,7 @@ def rows(truth: Known, sizes: Sequence[int]) -> Iterator[Row]:
 def fitted(sizes: Array, values: Array, floor: float) -> tuple[float, float, float] | None:
     """Order fitted to the last three errors above a floor, and the sizes it is fitted between.
 
-    Coarser ones have not come to their order yet. None: fewer than two are above it.
+    Coarser meshes have not reached their order. None: fewer than two errors are above it.
     """
     good = np.flatnonzero(np.isfinite(values) & (values > floor))[-3:]
     if len(good) < 2:

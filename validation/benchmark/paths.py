@@ -42,7 +42,7 @@ GOALS = {  # ms, by path, and by ring of the boundary-value problem
 
 
 def rows(extent: Extent) -> Iterator[Row]:
-    """All of them."""
+    """Rows of all paths."""
     for case, scene in PATHS.items():
         work = partial(der.fold, scene)
         yield path_row("path", case, work, extent.repeats, GOALS.get(case))
@@ -62,7 +62,7 @@ def bvp_paths(repeats: int, rings: tuple[BenchRing, ...] = RINGS) -> Iterator[Ro
 
 
 def relaxation(sizes: tuple[int, ...], repeats: int) -> Iterator[Row]:
-    """The march of the angle by dynamic relaxation alone against the same by Newton, over N."""
+    """Control of the angle by dynamic relaxation, and by Newton's method, over N."""
     for n in sizes:
         ring = gripped_ring(der.circle(), der.rectangular_section(4.0), n)
         for follow, words in ((follow_relaxed, ""), (follow_angle, " by Newton")):

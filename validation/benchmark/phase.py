@@ -1,9 +1,9 @@
-"""Rows of a bench on phase diagrams: what more workers gain, and what sending a case costs.
+"""Rows of the benchmark on phase diagrams: the gain of more workers, the cost of sending a case.
 
     python -m validation.benchmark.phase
 
-Wall times of one and of two workers alternate within one run, so that a noisy machine hits both
-alike; where it has no two idle cores, the part of a core's time that cases got says so.
+Runs of one and of two workers alternate, so that a noisy machine disturbs both alike. If two cores
+are not idle, the row says which part of a core's time the cases got.
 """
 
 from __future__ import annotations

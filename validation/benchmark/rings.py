@@ -1,8 +1,8 @@
 """The rings on which the benchmark compares methods, and what is known of their paths.
 
-The truth is the boundary-value problem's path at a tolerance of 1e-11, at many more states than any
-method finds, and a curve through them. Where AUTO-07p has computed the same ring, a row of the
-benchmark says how far its states lie from that curve.
+The reference is the path of the boundary-value problem at a tolerance of 1e-11: a curve through
+many more states than any method finds. Where AUTO-07p has computed the same ring, a row of the
+benchmark says how far its states are from that curve.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from der.bvp.solve import FINEST, solve_with_points
 from validation.benchmark.rows import Row, counts, finite
 
 TABLES = Path(__file__).parents[1] / "reference"
-SHIFTED = 61  # states at other places, by which the curve through the former is judged
-NEAR = 1e-3  # of the scaled state: closer ones would make the curve's parameter uneven
+SHIFTED = 61  # states at other places, which measure the error of that curve
+NEAR = 1e-3  # of the scaled state; closer states make the curve's parameter uneven
 BARE: Mapping[str, object] = {
     "stability": False,
     "self_crossings": False,
@@ -31,7 +31,7 @@ BARE: Mapping[str, object] = {
 
 
 class BenchRing(NamedTuple):
-    """A ring, and the table that AUTO-07p has left of it."""
+    """A ring, and the table that AUTO-07p has computed of it."""
 
     name: str
     ring: der.Ring
@@ -40,7 +40,7 @@ class BenchRing(NamedTuple):
     folds: int = 0
 
     def scene(self, **wants: object) -> der.Scene:
-        """The ring, and what is wanted of its path."""
+        """The scene of the ring, with further entries."""
         return der.Scene(self.ring, der.rectangular_section(self.h_over_t), **wants)  # type: ignore[arg-type]
 
 
@@ -60,7 +60,7 @@ RINGS = (
 
 
 def circle(h_over_t: float, **wants: object) -> der.Scene:
-    """A circle, and what is wanted of its path."""
+    """The scene of a circle, with further entries."""
     return BenchRing("circle", der.circle(), h_over_t).scene(**wants)
 
 
@@ -105,7 +105,7 @@ def _curve(case: BenchRing, states: int, shift: float) -> ReferenceCurve:
     for k, state in enumerate(scaled):
         if np.linalg.norm(state - scaled[kept[-1]]) > NEAR:
             kept.append(k)
-    kept[-1] = len(scaled) - 1  # the end is the end
+    kept[-1] = len(scaled) - 1  # the last state is always kept
     folds = tuple(point.gamma for point in path.folds)
     return ReferenceCurve(
         path.gamma[kept], path.moment[kept], path.energy[kept], others[kept], folds

@@ -1,4 +1,4 @@
-"""What the benchmark measures: rows, trials, and how time and memory are taken."""
+"""Rows and trials of the benchmark, and how time and memory are measured."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def front(trials: Iterable[Trial]) -> list[Trial]:
 
 
 def front_text(name: str, trials: Iterable[Trial]) -> str:
-    """The same in a sentence."""
+    """The Pareto front in a sentence."""
     best = (f"{1e3 * t.cpu:.1f} ms {t.error:.1e} {t.method} {t.setting}" for t in front(trials))
     return f"{name}: none is faster and better than {'; '.join(best)}"
 
@@ -117,7 +117,7 @@ def measured(
 
 
 def peak_memory(work: Callable[[], object]) -> int:
-    """The most that Python and numpy hold at once during ``work`` [B], above what there was."""
+    """The most that Python and numpy hold at once in ``work``, above what they held before [B]."""
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
@@ -172,7 +172,7 @@ class Attempt:
 
 
 def finite(value: float) -> float | None:
-    """The value, or None for infinity: an answer that is not there, such as a missing fold."""
+    """The value; None if it is infinite, as where a fold is missing."""
     return value if math.isfinite(value) else None
 
 

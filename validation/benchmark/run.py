@@ -1,10 +1,10 @@
 """Run time against error, on this machine, in one run: `python -m validation benchmark`.
 
-Every number is measured here and now: CPU time of this process, wall time, and the most memory held
-at once, medians of several runs, warm unless a row says otherwise, so that ratios between rows mean
-something on a noisy machine. Errors are normal distances, in (gamma/pi, M/max|M|) and in
-(gamma/pi, U/max U), from the converged solution of the boundary-value problem (`rings`). What
-others measured elsewhere stands in a table of its own, with its source.
+Every number is measured in this run: CPU time of this process, wall time, and the largest memory
+held. Times are medians of several runs, after a first one unless a row says otherwise. Errors are
+normal distances, in (gamma/pi, M/max|M|) and in (gamma/pi, U/max U), from the converged solution of
+the boundary-value problem (`rings`). Times of others, measured elsewhere, are in a table of their
+own, with the source.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Measurement = Row | Trial | Scale | str  # a string is for the reader alone
 
 
 def _orders(extent: Extent) -> Iterator[Row]:
-    """How well the truth is known, and how errors fall towards it."""
+    """How well the reference is known, and how errors fall towards it."""
     for case in extent.rings:
         truth = rings.known(case, extent.states)
         yield from rings.rows(truth)
@@ -50,7 +50,7 @@ PARTS = tuple(_ROWS)
 
 @dataclass
 class Found:
-    """All that was measured."""
+    """Everything that was measured."""
 
     rows: list[Row] = field(default_factory=list)
     trials: list[Trial] = field(default_factory=list)
@@ -69,7 +69,7 @@ class Found:
             self.skipped.append(one)
 
     def to_json(self) -> str:
-        """JSON text, with the machine, and what is cited set apart."""
+        """JSON text, with the machine, and the cited times apart."""
         entries = {"machine": machine(), "version": version("ring-origami")}
         entries |= asdict(self) | {"cited": CITED}
         return json.dumps(entries, indent=1, allow_nan=False) + "\n"
@@ -94,7 +94,7 @@ def run(
     Raises
     ------
     ValueError
-        For a part that there is not.
+        For an unknown part.
     """
     wrong = [part for part in only if part not in PARTS]
     if wrong or not only:
@@ -105,7 +105,7 @@ def run(
         for one in measure(QUICK if quick else FULL, only):
             found.add(one)
             print(one, flush=True)
-    finally:  # Ctrl-C keeps what there is
+    finally:  # Ctrl-C keeps what was measured
         for target in [file, *([] if out is None else [out / "bench.json"])]:
             if target is not None:
                 content = found.to_json().encode()
@@ -117,7 +117,7 @@ def run(
 
 
 def measure(extent: Extent, only: tuple[str, ...]) -> Iterator[Measurement]:
-    """All that is measured, one thing after the other."""
+    """Everything that is measured, one part after the other."""
     for part in PARTS:
         if part in only:
             yield f"\n{part}"
@@ -127,7 +127,7 @@ def measure(extent: Extent, only: tuple[str, ...]) -> Iterator[Measurement]:
 
 
 def _draw(found: Found, out: Path) -> None:
-    """The pictures of what there is."""
+    """Draw what was measured."""
     from validation.benchmark.plot import draw_costs, draw_errors
 
     if any(trial.error is not None for trial in found.trials):

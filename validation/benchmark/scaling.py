@@ -17,12 +17,12 @@ from validation.benchmark.extent import Extent
 from validation.benchmark.rings import BARE, circle
 from validation.benchmark.rows import Row, cpu_time, measured
 
-AS_A_BATCH = 2048  # edges over which short solves are repeated, so that the clock can tell
+AS_A_BATCH = 2048  # edges: short solves are repeated up to so many, for the clock
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What N edges cost."""
+    """The cost of N edges."""
 
     n: int  # edges of the full ring
     newton: float  # s, CPU: one iteration on the full ring

@@ -1,4 +1,4 @@
-"""Start of commands: wall times, and what the first one after an installation compiles.
+"""Start of commands: wall times, and the kernels that the first command compiles.
 
 A fresh process folds a ring with an empty cache of kernels. Numba reports the start and the end of
 every compilation; those inside another one are subtracted from its time.
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from validation.benchmark.rows import Row
 
-if TYPE_CHECKING:  # a process that is timed imports this module first
+if TYPE_CHECKING:  # a timed process imports this module first
     from validation.benchmark.extent import Extent
 
 COMMAND = ("fold", "circle", "--h-over-t", "4", "--quiet")
@@ -28,7 +28,7 @@ COSTLIEST = 10  # kernels that have a row of their own
 
 
 class Compiled(NamedTuple):
-    """The time of compiling a kernel, without those that it calls."""
+    """The time of compiling a kernel, without the kernels that it calls."""
 
     kernel: str
     signatures: int

@@ -1,7 +1,7 @@
 """One state of the circle, M at gamma = pi/2, by every code that can turn a ring: error over time.
 
-A code that steps a dynamic rod through time has no path, so that all are asked for the same single
-number, from the flat ring on, before anything has folded or snapped.
+A code that steps a rod through time has no path. So all codes compute one number, from the flat
+ring on, before the ring folds or snaps.
 """
 
 from __future__ import annotations

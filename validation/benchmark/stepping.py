@@ -14,7 +14,7 @@ import der
 from der.bvp.gauss import Array
 from der.geometry.ring import Ring
 
-STEPS = 33  # to pi; so many AUTO-07p took on the circle. Halved where it does not follow
+STEPS = 33  # to pi, as many as AUTO-07p took on the circle; halved where solve_bvp fails
 MOST_NODES = 20_000
 FIRST_NODES = 6  # per segment
 SHORTEST = 1e-3  # rad; a path that folds can be stepped no further
@@ -22,7 +22,7 @@ SHORTEST = 1e-3  # rad; a path that folds can be stepped no further
 
 @dataclass(frozen=True)
 class Stepped:
-    """What the stepping found."""
+    """The path that was found."""
 
     gamma: Array  # (n,) rad
     moment: Array  # (n,) GJ/a, of one arm

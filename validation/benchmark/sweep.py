@@ -1,9 +1,9 @@
 """A thousand rings of the paper's range on a few processes, M to 1e-4, by either solver.
 
-The rod starts every ring on a mesh whose error bars are mostly small enough. Where they say that M
-is worse than asked for, the ring is folded again on as many edges as their order, 4, promises to
-suffice. The error bars are then checked on a sample, against the boundary-value problem, whose own
-errors are estimates.
+The rod starts on a mesh whose error bars are mostly small enough. If an error bar of M is too
+large, the ring is folded again, on as many edges as the order of the error, 4, asks for. The error
+bars are then checked on a sample of the rings, by the boundary-value problem, whose own errors are
+estimates.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ Method = Callable[[der.Ring, der.Section], Swept]
 
 
 def scene(ring: der.Ring, section: der.Section, n: int) -> der.Scene:
-    """What a sweep asks of a ring: the curve, with error bars, and nothing besides."""
+    """The scene of a sweep: the path with error bars, and nothing else."""
     return der.Scene(ring, section, n_edges=n, error_bars=True, save_at=(math.pi,), **BARE)  # type: ignore[arg-type]
 
 
@@ -76,8 +76,8 @@ def _finer(ring: der.Ring, n: int, error: float | None, asked: float) -> int:
 def _divisible(ring: der.Ring, n: float) -> int:
     """The next number of edges from ``n`` on that can be halved twice, on the ring's sector.
 
-    Where it can be done no third time, cells are shared out on the coarsest of the three meshes,
-    which does justice to the most fillets (`der.geometry.mesh`).
+    The number is not divisible once more: the mesh is then laid out on the coarsest of the three,
+    which resolves fillets best (`der.geometry.mesh`).
     """
     unit = 16 if ring.symmetry == "D2" else 8
     return unit * (math.ceil(n / unit) // 2 * 2 + 1)
@@ -127,7 +127,7 @@ def largest_error_bar(path: der.Path) -> float | None:
 def rows(
     count: int = 1000, sample: int = 40, *, number: int = WORKERS, seed: int = SEED
 ) -> Iterator[Row]:
-    """What the sweep takes, and what it reaches, by the rod and by the boundary-value problem."""
+    """Times and errors of the sweep, by the rod and by the boundary-value problem."""
     rings = list(islice(random_rings(count, seed), count))
     start = time.perf_counter()
     with workers(number) as crew:
@@ -162,7 +162,7 @@ def _batch(rings: list[Drawn], work: Method) -> list[Swept]:
 
 
 def _reached(method: str, found: list[Swept]) -> Iterator[Row]:
-    """Time a ring, meshes that were enough, and the errors that are estimated."""
+    """Time for a ring, the meshes that were enough, and the estimated errors."""
     each = 1e3 * statistics.median(one.seconds for one in found)
     counts = sorted(Counter(one.n for one in found).items())
     note = ", ".join(f"{times} on {n} edges" for n, times in counts) if method == "rod" else ""

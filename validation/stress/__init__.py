@@ -1,4 +1,4 @@
-"""Thousands of cases far outside what anyone folds, each failure explained or counted.
+"""Thousands of extreme cases; every failure is explained or counted.
 
 May import der; run from a clone: python -m validation stress.
 Begin with run.py.

@@ -1,6 +1,6 @@
 """Scenes that are meant to break the solvers: drawn at random, corners first, from a seed.
 
-A case is plain JSON, so that one that failed can be kept, sent and run again.
+A case is plain JSON: one that failed can be kept, sent and run again.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ class Case:
     Parameters
     ----------
     kind : one of `KINDS`.
-    parameters : what it takes to do it again, in JSON's types.
+    parameters : everything that is needed to repeat it, in JSON's types.
     """
 
     kind: str
     parameters: Mapping[str, Any]
 
     def to_json(self) -> dict[str, Any]:
-        """The case as it is kept."""
+        """The entries of its JSON object."""
         return {"kind": self.kind, "parameters": dict(self.parameters)}
 
 
@@ -85,7 +85,7 @@ def cases(count: int, seed: int, *, most_edges: int = 2048) -> Iterator[Case]:
 
 
 def scene_of(parameters: Mapping[str, Any], **more: Any) -> Scene:
-    """The scene of a case, with what else is wanted of it."""
+    """The scene of a case, with further entries."""
     wants = dict(parameters["wants"]) | more
     return Scene(ring_of(parameters["ring"]), section_of(parameters), **wants)
 
@@ -129,7 +129,7 @@ def _log(random: np.random.Generator, low: float, high: float) -> float:
 
 
 def _section(random: np.random.Generator) -> Parameters:
-    """h/t and nu over all that the solvers are made for, ends and the critical values too."""
+    """h/t and nu over the range of the solvers, with its ends and the critical values."""
     critical = [0.05, 1.0, 1.5075766, 1.6, BIRTH_OF_FOLDS, 3.469928, 4.0, 100.0]
     drawn = [_log(random, 0.05, 100.0), _log(random, 0.5, 6.0), random.choice(critical)]
     h_over_t = float(random.choice(drawn, p=[0.4, 0.4, 0.2]))
@@ -164,7 +164,7 @@ def _edges(random: np.random.Generator, most: int) -> int:
 
 
 def _wants(random: np.random.Generator, ring: Parameters, most: int) -> Parameters:
-    """Everything about a scene that can be chosen freely, beside the way it is followed."""
+    """The entries of a scene that can be chosen freely, without its control."""
     no_quarter = ring["shape"] in ("triangle", "profile")
     sectors = ["auto", "auto", "half", "full"] + ([] if no_quarter else ["quarter"])
     return {
@@ -190,7 +190,7 @@ def _path(random: np.random.Generator, most: int) -> Parameters:
 
 
 def _paths(most_here: int, **wants: Any) -> Draw:
-    """Paths on few edges, and what is always wanted of them."""
+    """Paths on few edges, with entries of the scene that are always the same."""
 
     def draw(random: np.random.Generator, most: int) -> Parameters:
         found = _path(random, min(most, most_here))
@@ -210,7 +210,7 @@ def _beyond(random: np.random.Generator, most: int) -> Parameters:
 
 
 def _close_folds(random: np.random.Generator, most: int) -> Parameters:
-    """The circle where its two folds are born: they lie as close together as one likes."""
+    """The circle near the section where its two folds are born, as close together as possible."""
     n_edges = int(random.choice([32, 64, 128]))
     away = float(random.choice([-1.0, 1.0])) * 10.0 ** random.uniform(-9.0, -1.5)
     wants = {"n_edges": min(n_edges, most), "sector": str(random.choice(["auto", "full"]))}
@@ -296,7 +296,7 @@ def _threads(random: np.random.Generator, most: int) -> Parameters:
 
 
 def _points(random: np.random.Generator, most: int) -> Parameters:
-    """Profiles through points that were measured badly."""
+    """Profiles through inaccurate points."""
     found = _path(random, min(most, 128))
     of = _ring(random, shapes=("circle", "ellipse", "rectangle"))
     points = {
@@ -310,7 +310,7 @@ def _points(random: np.random.Generator, most: int) -> Parameters:
 
 
 def _extreme(random: np.random.Generator, most: int) -> Parameters:
-    """One number at a time far out of what makes sense, though it is allowed."""
+    """One number at a time that is extreme, but allowed."""
     wants: Parameters = {"n_edges": int(random.choice([8, 16, 32]))}
     found: Parameters = {"ring": circle().to_json(), "h_over_t": _log(random, 0.5, 6.0), "nu": 0.3}
     which = str(random.choice(["gamma_max", "save_at", "section", "a_over_t", "ring", "natural"]))
@@ -352,11 +352,11 @@ def _scale(random: np.random.Generator, most: int) -> Parameters:
 
 
 def _input(random: np.random.Generator, most: int) -> Parameters:
-    """Numbers of an argument and of a value; `inputs` knows the lists."""
+    """Positions of an argument and of a value in the lists of `inputs`."""
     return {"argument": int(random.integers(2**16)), "value": int(random.integers(2**16))}
 
 
-# How often a kind is drawn, and how; "input" and "scale" cost nothing, the others a path or more.
+# How often a kind is drawn, and by which function; all but "input" and "scale" follow a path.
 KINDS: dict[str, tuple[int, Draw]] = {
     "path": (30, _path),
     "beyond": (6, _beyond),

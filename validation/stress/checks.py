@@ -1,6 +1,6 @@
-"""What must hold of every record, whatever the ring: faults by name, none of them excused.
+"""What must hold for every record of every ring: faults by name, without exceptions.
 
-Only the record and the statement are looked at; nothing of either solver is used.
+Only the record and the scene are used, and nothing of either solver.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def not_converged(reason: str) -> str:
 
 
 def faults(scene: Scene, path: Path) -> Iterator[Fault]:
-    """What is wrong with a path, finished or not."""
+    """Faults of a path, finished or not."""
     if not len(path):
         return
     yield from _start(path)
@@ -60,7 +60,7 @@ def _start(path: Path) -> Iterator[Fault]:
 
 
 def _end(scene: Scene, path: Path) -> Iterator[Fault]:
-    """A finished path ends where it was to end, and has been where it was to be solved for."""
+    """A finished path ends where it should, and has every state that was asked for."""
     last = float(path.gamma[-1])
     expected = {0.0} if scene.unload else {scene.gamma_max}
     if path.reason == Reason.TURNED_BACK.word:
@@ -69,7 +69,7 @@ def _end(scene: Scene, path: Path) -> Iterator[Fault]:
         expected |= {math.pi, -math.pi}
     if last not in expected:
         yield "end", f"the path is done but ends at gamma = {last!r}"
-    if scene.control == "moment":  # under a dead moment gamma leaps
+    if scene.control == "moment":  # under a dead moment gamma jumps
         return
     targets = scene.save_at
     if targets is None:
@@ -81,7 +81,7 @@ def _end(scene: Scene, path: Path) -> Iterator[Fault]:
 
 
 def _points(path: Path) -> Iterator[Fault]:
-    """Points are those of the arrays, in order, and a fold changes the index by one."""
+    """Points are states of the arrays, in order, and a fold changes the index by one."""
     places = [point.position for point in path.points]
     if places != sorted(places):
         yield "points", f"the points are not in path order: {places}"
@@ -97,7 +97,7 @@ def _points(path: Path) -> Iterator[Fault]:
 
 
 def _monotonic(path: Path, tolerance: float) -> Iterator[Fault]:
-    """Gamma turns at folds and nowhere else; M at limits, and with gamma's sense at folds."""
+    """Gamma turns back at folds only, and M at limits only."""
     crossings = {point.position for point in path.contacts}
     cuts = _cuts(path, path.folds)
     same = max(SAME, tolerance)  # residuals leave gamma as uncertain as they are large
@@ -123,7 +123,7 @@ def _cuts(path: Path, points: tuple[Point, ...]) -> list[int]:
 
 
 def _indices(path: Path) -> Iterator[Fault]:
-    """Between neighbours without a singular state the index stays."""
+    """Between neighbours without a singular state, the index does not change."""
     singular = {point.position for point in path.points if point.kind in STABLE_KINDS}
     index = path.index.tolist()
     for k, (a, b) in enumerate(pairwise(index)):
@@ -161,7 +161,7 @@ def work_lost(path: Path, *, asked: bool = False) -> float:
         if len(part) < FEWEST or not np.abs(part.moment).max() > 0.0 or np.ptp(part.gamma) < SAME:
             continue
         missing = work_missing(part) * float(part.energy.max()) / scale
-        # of a path that hardly leaves its start, rounding of U is all there is to see
+        # on a very short path, U is rounding
         if missing * scale > 1e-9:
             worst = max(worst, missing)
     return worst
@@ -194,8 +194,8 @@ def _part(path: Path, low: int, high: int) -> Path:
 
 
 def too_uncertain(path: Path, tolerance: float) -> Iterator[Fault]:
-    """Errors of the boundary-value problem's states above what was asked for."""
-    # of a path that ends at once, errors are relative to what a first small turn takes
+    """Errors of the states of the boundary-value problem above the tolerance."""
+    # on a very short path, errors are relative to the small values there
     if len(path) > 1 and np.ptp(path.gamma) > 0.05:
         largest = largest_error(path)
         if not largest <= tolerance:
@@ -206,7 +206,7 @@ def too_uncertain(path: Path, tolerance: float) -> Iterator[Fault]:
 
 
 def geometry(scene: Scene, path: Path, shapes: Shapes) -> Iterator[Fault]:
-    """The ring is closed, keeps its lengths, and its grips have the angle that they were given."""
+    """The ring is closed, keeps its lengths, and its grips have the prescribed angle."""
     places = sites(scene.ring, scene.n_edges, "full")
     cell = np.diff(places)
     length = 0.5 * (cell + np.roll(cell, 1))
@@ -304,7 +304,7 @@ def _at_a_turn(path: Path, gamma: float) -> bool:
 def outside_error_bars(rod: Path, reference: Path, times: float) -> Iterator[Fault]:
     """Where the other solver's values lie outside ``times`` the sum of both errors.
 
-    Where the rod knows no error it claims nothing, neither values nor how many states there are.
+    Where the rod knows no error, neither its values nor the number of its states are checked.
     """
     errors: list[Any] = [rod.error, reference.error]
     for name in ("moment", "energy"):

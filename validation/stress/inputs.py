@@ -1,4 +1,4 @@
-"""Values that no argument may take, and the arguments of all that is public."""
+"""Values that no argument may take, and the arguments of all public functions."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ NEVER: dict[str, Any] = {
     "complex array": np.ones(3) * 1j,
 }
 NOT_POSITIVE = {"0": 0.0, "-0": -0.0, "-1": -1.0, "minus subnormal": -5e-324}
-# May be taken or refused, by a sentence; never may anything else come of them.
+# May be accepted, or refused in a sentence; nothing else may happen.
 PERHAPS: dict[str, Any] = {
     "subnormal": 5e-324,
     "nearly subnormal": 1e-310,
@@ -73,7 +73,7 @@ CHOICES = ("sector", "control", "solver", "curvature", "stretch", "until")  # of
 
 
 def _but(*taken: str, **more: Any) -> dict[str, Any]:
-    """What is never taken, but for some of it, and more."""
+    """The values that are never accepted, without some of them, and with others."""
     return {name: value for name, value in NEVER.items() if name not in taken} | more
 
 
@@ -130,7 +130,7 @@ def _of_sections() -> Iterator[Argument]:
 def _with(
     make: Callable[..., object], usual: Mapping[str, Any], name: str
 ) -> Callable[[Any], object]:
-    """What is made of the usual values with another for ``name``."""
+    """A call with the usual values, and a given one for ``name``."""
     return lambda value: make(**{**usual, name: value})
 
 
@@ -151,7 +151,7 @@ def _of_scenes() -> Iterator[Argument]:
     for name in CHOICES:
         yield argument(name, _but(*optional.get(name, ())))
     lists = {"past the end": [9.0], "negative": [-1.0], "with nan": [math.nan], "words": ["1"]}
-    # of what iterates to nothing or to numbers, nothing is wrong
+    # an iterable of numbers, or an empty one, is accepted
     yield argument("save_at", _but("none", "list", "array", "dict", "bytes", **lists))
 
 
@@ -166,9 +166,9 @@ def _of_records() -> Iterator[Argument]:
 
 
 def refusal(argument: Argument, name: str) -> str | None:
-    """What is wrong with how a value is received, in a sentence; None where it is as it must be.
+    """A sentence where a value is wrongly accepted or wrongly refused; None where all is right.
 
-    Anything but a ValueError is for the caller to see.
+    Exceptions other than ValueError are raised.
     """
     is_refused = name in argument.refused
     value = argument.refused[name] if is_refused else PERHAPS[name]

@@ -1,4 +1,4 @@
-"""Phase diagrams whose runs are killed and resumed, against the same diagram drawn in one run.
+"""Compares a phase diagram whose runs are killed and resumed with one that is drawn in one run.
 
     python -m validation.stress.kill_and_resume [--times N] [--diagram NAME] [--finest N]
         [--workers N] [--seed N] [--out DIR]
@@ -33,7 +33,7 @@ from scenarios.output import Arguments
 NOTES = "RING_ORIGAMI_NOTES"  # environment: the file that workers write to
 TABLES = ("cases.csv", "boundaries.csv", "corners.csv")
 EARLY = 0.2  # of the kills: while the run is starting
-CALM = 0.1  # s without a note, after which nobody works any more
+CALM = 0.1  # s without a note, after which no worker is left
 PATIENCE = 30  # of these
 
 Process = subprocess.Popen[str]
@@ -41,11 +41,11 @@ Process = subprocess.Popen[str]
 
 @dataclass(frozen=True)
 class Killed:
-    """What kills have cost.
+    """The cost of the kills.
 
     Attributes
     ----------
-    kills : how many hit a run; those that it outran are not counted
+    kills : how many hit a run; a run that had ended before is not counted
     cases : different ones that were begun
     begun : how often one was begun
     in_flight : begun by the run that was killed and not yet in the store, at each kill
@@ -67,7 +67,7 @@ class Killed:
 
     @property
     def ok(self) -> bool:
-        """Whether all is the same, and nothing was solved again but what was in flight."""
+        """Whether all tables are the same, and only cases in flight were solved again."""
         once = self.stored == self.cases and self.again <= sum(self.in_flight)
         return once and all(self.same.values())
 
@@ -88,7 +88,7 @@ class Killed:
 
 
 def noted(case: Case) -> Row:
-    """`solve_case`, of which a note is taken as it begins."""
+    """`solve_case`, with a note as it begins."""
     # one write to the end of a file is complete, whoever else writes
     file = os.open(os.environ[NOTES], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
     try:
@@ -104,7 +104,7 @@ def notes(file: File) -> Counter[str]:
 
 
 def calm(file: File) -> bool:
-    """Whether workers that have lost their parent stop taking notes."""
+    """Whether workers whose parent was killed stop working."""
     sizes = [-1]
     for _ in range(PATIENCE):
         sizes.append(file.stat().st_size if file.exists() else 0)
@@ -185,7 +185,7 @@ class Wanted:
     workers: int
 
     def start(self, folder: File, notes_file: File) -> Process:
-        """Draw it in a folder, going on with what is there, with notes taken."""
+        """Draw it in a folder, resuming what is there, with notes."""
         return subprocess.Popen(
             [
                 sys.executable,
@@ -200,7 +200,7 @@ class Wanted:
         )
 
     def draw(self, folder: str) -> None:
-        """What a process does that may be killed."""
+        """Draw it in this process, which may be killed."""
         phase_diagram(
             self.diagram,
             folder,

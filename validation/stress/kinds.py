@@ -1,4 +1,4 @@
-"""What is done with each kind of case of a stress run, and what must hold of what comes of it."""
+"""What is done with each kind of case of a stress run, and what must hold for the result."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ LOOSEST = 1e-9  # tolerance beyond which states of two solves are not compared
 
 
 class Refused(ValueError):
-    """What was asked for is refused by the statement, in a sentence."""
+    """The scene is refused, in a sentence."""
 
 
 # --- One path and all that must hold of it ---------------------------------------------------
 
 
 def _scene(parameters: Mapping[str, Any], **more: Any) -> Scene:
-    """The scene, whose refusal is the statement's affair and not the solver's."""
+    """The scene of a case; `Refused` where its values are not allowed."""
     try:
         return scene_of(parameters, **more)
     except ValueError as wrong:
@@ -83,7 +83,7 @@ def unfinished(path: Path) -> Iterator[Fault]:
 
 
 def _path(parameters: Mapping[str, Any]) -> Iterator[Fault]:
-    """A path, and every test that a single one can be put to."""
+    """A path, and every check of a single path."""
     scene = _scene(parameters, shapes=True)
     path = _folded(scene)
     yield from unfinished(path)
@@ -101,7 +101,7 @@ def _judged(scene: Scene, path: Path) -> Iterator[Fault]:
         symmetric = scene.control == "arclength" or scene.sector == "auto"
         if symmetric and scene.tolerance <= LOOSEST and scene.ring.shape != "profile":
             off = asymmetry(scene, path.shapes)
-            # at a branch point the ring is free to move along what branches off
+            # at a branch point the ring can move along the other path at no cost
             off[[point.position for point in path.branches]] = 0.0
             if (worst := float(off.max(initial=0.0))) > SYMMETRIC:
                 yield "asymmetric", f"a state is {worst:.2g} a off its ring's symmetry"
@@ -110,7 +110,7 @@ def _judged(scene: Scene, path: Path) -> Iterator[Fault]:
 
 
 def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator[Fault]:
-    """Energy is work; where the states are too few to tell, they are asked for again, densely."""
+    """Energy is work; where the states are too few to tell, the path is solved with more."""
     if path.status != "done" or work_lost(path) <= LOOSE:
         return
     gammas = denser(path, scene.gamma_max)
@@ -122,7 +122,7 @@ def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator
 
 
 def _returned(scene: Scene, path: Path) -> Iterator[Fault]:
-    """After a loop without a snap the ring is where it was."""
+    """After a loop without a snap the ring is back in its first state."""
     if path.shapes is None or scene.tolerance > LOOSEST or path.gamma[-1] != path.gamma[0]:
         return
     off = float(np.abs(path.shapes.x[-1] - path.shapes.x[0]).max())
@@ -209,8 +209,8 @@ def _bvp(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 def _compare(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     """The rod's error bars hold the values of the boundary-value problem.
 
-    Next to a boundary of folding modes a coarse mesh may lie on its other side, where the path is
-    another: finer ones are tried before the two are said to differ.
+    Near a boundary between folding modes a coarse mesh may be on the other side, with another path:
+    finer meshes are tried before the two are said to differ.
     """
     scene = _scene(parameters)
     reference = solve_bvp(scene, tolerance=1e-9)
@@ -245,7 +245,7 @@ def _steps(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 
 @contextmanager
 def _stepping(first: float, longest: float) -> Iterator[None]:
-    """Other lengths of steps along a path than the follower's own."""
+    """Follow paths in steps of other lengths."""
     usual = folding._request
 
     def request(scene: Scene) -> Request:

@@ -1,8 +1,8 @@
-"""Rings at random over the ranges of the paper's phase diagrams, and how the solver fares on them.
+"""Random rings over the ranges of the paper's phase diagrams, and faults of their paths.
 
 A path is suspect if it does not end at pi, if its energy is not the work done, or if an error is
-above the tolerance. A continuation that jumps to another strand gives itself away: the work no
-longer accounts for the energy.
+above the tolerance. If the continuation jumps to another path, the energy is no longer the work
+done.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from scenarios.random_folds import work_faults
 
 @dataclass(frozen=True)
 class Suspect:
-    """A ring whose path is not what it should be."""
+    """A ring whose path has a fault."""
 
     ring: Ring
     section: Section
@@ -41,7 +41,7 @@ class Suspect:
 
 @dataclass(frozen=True)
 class Survey:
-    """What became of the rings."""
+    """The results of a survey."""
 
     rings: int
     reached_pi: int

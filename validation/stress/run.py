@@ -1,12 +1,12 @@
-"""An attempt to break both solvers, and an account of what happened: `python -m validation stress`.
+"""Tries to break both solvers, and counts the failures: `python -m validation stress`.
 
     summary = validation.stress.run.stress("quick")
     validation.stress.run.repeat(summary.failed[0].case)   # one of them again
 
-A failure is explained if the statement refuses the case, or if a solver gives up for one of the
-reasons in `EXPLAINED`, which the documentation describes. Anything else is not explained, whatever
-the scene: another exception, no answer within the time limit, a warning, a number that is not
-finite, a record that contradicts itself, a residual above the tolerance, energy that is not work.
+A failure is explained if the scene is refused, or if a solver stops for one of the reasons in
+`EXPLAINED`, which the documentation describes. Any other failure is not explained: another
+exception, no answer within the time limit, a warning, a number that is not finite, a record that
+contradicts itself, a residual above the tolerance, energy that is not work.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from validation.stress.summary import Failure, Summary
 
 LEVELS = {"quick": (120, 128), "long": (10_000, 2048)}  # number of cases, edges at most
 BATCH = 8  # cases that a worker gets at a time
-TIME_LIMIT = 120.0  # s of CPU time, of one case: what takes longer hangs
+TIME_LIMIT = 120.0  # s of CPU time for one case; one that takes longer hangs
 SAVE_EVERY = 30.0  # s
 REFUSED = "ValueError"
 
@@ -88,7 +88,7 @@ def stress(
     Returns
     -------
     Summary
-        Of what was done until Ctrl-C, where it was pressed.
+        Of the cases that were done, until Ctrl-C where it was pressed.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def stress(
             if file is not None and now - saved > SAVE_EVERY:
                 summary.save(file)
                 saved = now
-    except KeyboardInterrupt:  # what there is is kept
+    except KeyboardInterrupt:  # the summary so far is kept
         summary.interrupted = True
     if progress is None:
         _shown("")
@@ -161,7 +161,7 @@ def _done(tried: Iterable[Case], width: int) -> Iterator[tuple[Case, tuple[Failu
 
 
 def _repeated(batch: tuple[_Numbered, ...]) -> list[_Done]:
-    """What a worker does."""
+    """Repeat a batch of cases; this is what a worker does."""
     _load_kernels()
     results = []
     for thing in batch:
@@ -172,14 +172,14 @@ def _repeated(batch: tuple[_Numbered, ...]) -> list[_Done]:
 
 
 def _died(thing: _Numbered) -> _Done:
-    """Of a case that has ended its worker, time and again."""
+    """The result of a case that has killed its worker several times."""
     text = "the process that worked on it died"
     return (Failure(thing.case, "worker died", text, explained=False, seconds=0.0),), 0.0
 
 
 @cache
 def _load_kernels() -> None:
-    """Compile or load what is timed, so that no case waits for it."""
+    """Compile or load the kernels, so that no case waits for them."""
     scene = der.Scene(der.circle(), der.section(1.0, 1.0), n_edges=8, gamma_max=0.1)
     der.fold(scene)
     der.fold(replace(scene, control="angle"))
@@ -214,7 +214,7 @@ def repeat(case: Case | Mapping[str, Any]) -> tuple[Failure, ...]:
         found.append((not_converged(failure.path.reason), str(failure)))
     except KeyboardInterrupt:
         raise
-    except BaseException as wrong:  # whatever it is, it is what is looked for
+    except BaseException as wrong:  # any other exception is a failure to be reported
         found.append((f"unexpected {type(wrong).__name__}", str(wrong)))
     seconds = time.monotonic() - began
     return tuple(
@@ -224,7 +224,7 @@ def repeat(case: Case | Mapping[str, Any]) -> tuple[Failure, ...]:
 
 @contextmanager
 def _time_limit(seconds: float) -> Iterator[None]:
-    """A TimeoutError after so many seconds of the processor, whatever else the machine does.
+    """Raise TimeoutError after so many seconds of CPU time.
 
     In the main thread only, where signals arrive.
     """
@@ -245,7 +245,7 @@ def _time_limit(seconds: float) -> Iterator[None]:
         yield
     except BaseException:
         if not rang:
-            raise  # else it is what a clause in between has made of the alarm
+            raise  # else another exception has replaced the TimeoutError
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, usual)

@@ -1,4 +1,4 @@
-"""What became of the cases of a stress run: counted, shown and saved."""
+"""The results of a stress run: counted, printed and saved."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from validation.stress.cases import Case
 
 @dataclass(frozen=True)
 class Failure:
-    """A case that did not go well."""
+    """A case that failed."""
 
     case: Case
-    reason: str  # by which failures are counted: a refusal, why a solver gave up, or a fault
+    reason: str  # failures are counted by it: a refusal, the reason of a solver, or a fault
     message: str
     explained: bool
     seconds: float
 
     def to_json(self) -> dict[str, Any]:
-        """The failure as it is kept, with all that it takes to do it again."""
+        """The entries of its JSON object, from which the case can be repeated."""
         return asdict(self) | {"case": self.case.to_json()}
 
 
 @dataclass
 class Summary(Saved):
-    """What became of the cases."""
+    """The results of all cases."""
 
     level: str
     seed: int
@@ -60,7 +60,7 @@ class Summary(Saved):
         return "\n".join(lines)
 
     def add(self, case: Case, found: Sequence[Failure], seconds: float) -> None:
-        """Count a case and what went wrong with it."""
+        """Count a case and its failures."""
         self.cases += 1
         self.by_kind[case.kind] = self.by_kind.get(case.kind, 0) + 1
         self.slowest = max(self.slowest, seconds)

@@ -1,15 +1,15 @@
 """How easily a released folded ring opens: ellipse, b/a = 0.6, over h/t.
 
-In grips that turn freely, the folded ellipse is behind an energy barrier that the path of twisting
-shows. Released, it need not open the way it was folded: a saddle without that symmetry is far
+In grips that turn freely, an energy barrier keeps the ellipse folded; the path of twisting shows
+it. The released ring can open in another way: a saddle without the symmetry of twisting is far
 lower. At h/t = 4 the barrier is 0.01068 GJ/a instead of 0.6713. Below h/t = 3.636 the released ring
 opens by itself, where twisting shows a well down to 2.197. A circle's saddle is the same with and
 without grips.
 
-    python -m scenarios.landscape_left_alone [DIR]
+    python -m scenarios.landscape_free_ring [DIR]
 
 writes pass.json and pass.png (h/t = 4), barriers.json and barriers.png to DIR (default:
-out/landscape_left_alone).
+out/landscape_free_ring).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ twisted = der.landscape(scene)
 found = der.barrier(scene)
 
 if __name__ == "__main__":
-    place = folder("landscape_left_alone")
+    place = folder("landscape_free_ring")
     keep(found, place, "pass")
     curves = barriers_over(ring, H_OVER_T, free=True)
     keep(curves, place, "barriers")
