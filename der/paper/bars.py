@@ -1,6 +1,6 @@
-"""Rings as shaded bars: the quadrilaterals of a bar's surface, seen from afar.
+"""Rings as shaded bars: the quadrilaterals of a bar's surface, in parallel projection.
 
-The bar has the section's h/t but is drawn thicker than it is, so that its turns can be seen.
+The bar has the section's h/t but is drawn thicker, so that its rotation can be seen.
 """
 
 from __future__ import annotations
@@ -9,22 +9,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from der.paper.cases import Array
+from der.utils.checks import Array
+from der.viz.ribbon import Camera, unit
 
 HEIGHT = 0.0125  # of the bar with h/t = 4 over the ring's length; all bars have the same h * t
 GRIPPED = 0.008  # part of the length that is dark at a grip, to either side
 OUTSIDE, INSIDE = (0.36, 0.64, 0.87), (0.97, 0.74, 0.42)  # faces across d2
 EDGE, GRIP = (0.80, 0.80, 0.83), (0.15, 0.15, 0.15)  # faces across d1
 LIGHT = (0.35, 0.45, 0.82)  # on the screen: right, up, towards the eye
-
-
-class Camera(NamedTuple):
-    """Directions on the screen, unit vectors in the basis (E1, E2, E3)."""
-
-    right: Array
-    up: Array
-    towards: Array
 
 
 class Picture(NamedTuple):
@@ -42,24 +36,22 @@ class Picture(NamedTuple):
 
 
 def camera(axis: str, azimuth: float = 0.0, elevation: float = 0.0) -> Camera:
-    """A camera that looks at the flat ring's face, then walks round it.
+    """A camera that looks at the flat ring's face, rotated about the ring.
 
     Parameters
     ----------
-    axis : how the twisting axis E3 lies on the screen, before and after: "upright" or "level".
-    azimuth, elevation : how far to walk to the right and up, degrees.
+    axis : direction of the twisting axis E3 on the screen: "upright" or "level".
+    azimuth, elevation : rotation to the right and up, degrees.
     """
     right, up = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     if axis == "level":
         right, up = (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)
     basis = np.array([right, up, (1.0, 0.0, 0.0)])
-    a, e = math.radians(azimuth), math.radians(elevation)
-    about_up = np.array([[math.cos(a), 0, -math.sin(a)], [0, 1, 0], [math.sin(a), 0, math.cos(a)]])
-    about_right = np.array(
-        [[1, 0, 0], [0, math.cos(e), -math.sin(e)], [0, math.sin(e), math.cos(e)]]
-    )
-    walk = about_up @ about_right if axis == "level" else about_right @ about_up
-    return Camera(*(walk @ basis))
+    about_up = Rotation.from_euler("y", -azimuth, degrees=True).as_matrix()
+    about_right = Rotation.from_euler("x", elevation, degrees=True).as_matrix()
+    turn = about_up @ about_right if axis == "level" else about_right @ about_up
+    right, up, towards = turn @ basis
+    return Camera(towards, right, up)
 
 
 def bar(
@@ -91,14 +83,14 @@ def bar(
         base[:, from_grip < GRIPPED * length] = GRIP
     else:
         base = np.broadcast_to(np.array(colour), (4, n, 3))
-    light = np.array(LIGHT) / np.linalg.norm(LIGHT) @ np.array(view)
+    on_screen = np.array([view.right, view.up]).T
+    light = unit(np.array(LIGHT)) @ np.array([view.right, view.up, view.towards])
     lit = np.clip(normal @ light, 0.0, 1.0)
     shaded = base * (0.60 + 0.40 * lit)[..., None]
 
     seen = normal @ view.towards > 0.0
     corners, shaded = corners[seen], shaded[seen]
     order = np.argsort(corners.mean(axis=1) @ view.towards)
-    on_screen = np.array([view.right, view.up]).T
     grips = np.array([x[-1] + x[0], x[n // 2 - 1] + x[n // 2]]) / 2
     along = np.array([0.0, 0.0, 0.033 * length])
     return Picture(
@@ -111,15 +103,14 @@ def bar(
 def _faces(x: Array, d1: Array, height: float, h_over_t: float) -> tuple[Array, Array]:
     """Corners (4, N, 4, 3) of a bar's faces, four around every edge, and their normals."""
     tangent = np.roll(x, -1, axis=0) - np.roll(x, 1, axis=0)
-    d2 = np.cross(tangent, d1)
-    d2 /= np.linalg.norm(d2, axis=1, keepdims=True)
+    d2 = unit(np.cross(tangent, d1))
     up, out = height / 2 * d1, height / h_over_t / 2 * d2
     lines = np.array([x + up + out, x + up - out, x - up - out, x - up + out])  # (4, N, 3)
     after = np.roll(lines, -1, axis=1)
     beside = np.roll(lines, -1, axis=0)
     corners = np.stack([lines, after, np.roll(after, -1, axis=0), beside], axis=2)
-    normal = np.cross(corners[:, :, 2] - corners[:, :, 0], corners[:, :, 3] - corners[:, :, 1])
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    across = corners[:, :, 2:] - corners[:, :, :2]  # both diagonals
+    normal = unit(np.cross(across[:, :, 0], across[:, :, 1]))
     outward = corners.mean(axis=2) - (x + np.roll(x, -1, axis=0)) / 2
     normal *= np.sign(np.einsum("fnk,fnk->fn", normal, outward))[..., None]
     return corners, normal

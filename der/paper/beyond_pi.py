@@ -1,4 +1,4 @@
-"""The circle that does not fold, twisted on beyond pi until it does."""
+"""A circle that is not foldable at pi, twisted beyond pi until it is folded."""
 
 from __future__ import annotations
 
@@ -14,8 +14,13 @@ from der.paper.cases import Case, Curve, at_vertices, smooth, solved
 from der.paper.snapshots import LEVEL
 from der.paper.tables import write_shapes
 from der.utils.files import FilePath
-from der.viz.plots import style
+from der.viz.curve import arc_length, evenly
+from der.viz.plots import rings, style
 
+TITLE = (
+    "Circle, $h/t$ = 1: not foldable at the first arrival at $\\pi$; twisted on, the path ends in "
+    "the three-covered ring"
+)
 NUMERALS = "ⅠⅡⅢⅣⅤⅥⅦⅧ"
 
 
@@ -29,14 +34,7 @@ def figc1(folder: FilePath) -> list[File]:
     canvas.draw_curve(panel, curve, canvas.MOMENT, canvas.COLOURS[1])
     canvas.dress(panel, canvas.MOMENT, "R", 7 * math.pi / 4)
     panel.set_ylim(-0.35, 4.4)
-    canvas.words(
-        panel,
-        (0.5, 1.05),
-        "Circle, $h/t$ = 1: not foldable at the first arrival at $\\pi$; twisted on, the path ends "
-        "in the three-covered ring",
-        transform=panel.transAxes,
-        fontsize=10,
-    )
+    style.place_text(panel, (0.5, 1.05), TITLE, transform=panel.transAxes, fontsize=10)
     states = curve.states[chosen][:, :2]
     style.place_letters(panel, NUMERALS, states, smooth(curve)[:, :2])
     canvas.legend_of_marks(figure, [curve], dot="state shown below")
@@ -51,8 +49,8 @@ def figc1(folder: FilePath) -> list[File]:
         canvas.place(row, picture, (x, 0.0))
         words = rf"$\bf{{{numeral}}}$   $\gamma$ = {curve.gamma[k] / math.pi:.3g} $\pi$"
         words = words.replace("= 0 $\\pi$", "= 0").replace("= 1 $\\pi$", "= $\\pi$")
-        canvas.words(row, (x, -0.72 * tall), words, fontsize=8.5)
-    canvas.bare(row, (0.0, -0.85 * tall), (widths.sum(), 0.55 * tall))
+        style.place_text(row, (x, -0.72 * tall), words, fontsize=8.5)
+    rings.bare(row, (0.0, -0.85 * tall), (widths.sum(), 0.55 * tall))
     about = "circle, h/t = 1, beyond pi until folded (a = R)"
     shots = [(curve, k) for k in chosen]
     return [
@@ -62,14 +60,7 @@ def figc1(folder: FilePath) -> list[File]:
 
 
 def _spread(curve: Curve) -> list[int]:
-    """States spread evenly over the ring's motion; the first arrival at pi and the last are in."""
+    """States spread evenly over the ring's motion, with the first arrival at pi among them."""
     if curve.shapes is None:
         raise ValueError("curve must have shapes to be drawn, got none")
-    moved = np.linalg.norm(np.diff(curve.shapes.x, axis=0), axis=(1, 2))
-    way = np.append(0.0, np.cumsum(moved))
-    even = np.linspace(0.0, way[-1], len(NUMERALS))
-    chosen = [int(np.argmin(np.abs(way - place))) for place in even]
-    at_pi = curve.first(math.pi)
-    nearest = min(range(1, len(chosen) - 1), key=lambda i: abs(way[chosen[i]] - way[at_pi]))
-    chosen[nearest] = at_pi
-    return chosen
+    return evenly(arc_length(curve.shapes.x), len(NUMERALS), keep=curve.first(math.pi))

@@ -1,4 +1,4 @@
-"""What the figures of the paper share: pages, axes against gamma, curves with marks, and bars."""
+"""Common parts of the paper's figures: pages, axes against gamma, curves with marks, and bars."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes as Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure as Figure
 
 from der.paper.bars import Picture
-from der.paper.cases import Array, Curve, in_words, smooth
+from der.paper.cases import Curve, in_words, smooth
 from der.paper.tables import write_curves
 from der.utils.files import FilePath
 from der.viz.palette import INK as INK
 from der.viz.palette import QUIET as QUIET
-from der.viz.plots import style
+from der.viz.plots import rings, style
 
 DPI = 200
 # Okabe and Ito: told apart by the colour-blind
@@ -30,7 +29,7 @@ NAMES = {MOMENT: "M", ENERGY: "U"}
 
 
 def page(width: float, height: float) -> Figure:
-    """An empty page, inches; it belongs to nobody and needs no display."""
+    """An empty page, inches; it is made without pyplot and needs no display."""
     return Figure(figsize=(width, height), dpi=DPI, facecolor="white")
 
 
@@ -51,7 +50,7 @@ def written(
 
 
 def sequence(n: int) -> list[Any]:
-    """n colours from dark to light that the colour-blind can put in order."""
+    """n colours from dark to light, in an order that the colour-blind can see."""
     return list(colormaps["viridis"](np.linspace(0.0, 0.88, n)))
 
 
@@ -65,7 +64,7 @@ def quarters(largest: float) -> tuple[list[float], list[str]]:
 
 
 def pi_times(k: int, n: int) -> str:
-    """The angle k pi/n as it is written."""
+    """The angle k pi/n as mathtext."""
     common = math.gcd(k, n)
     k, n = k // common, n // common
     top = {0: "0", 1: "\\pi"}.get(k, f"{k}\\pi")
@@ -99,7 +98,7 @@ def mark(kind: str, colour: Any = INK) -> dict[str, Any]:
 
 
 def labelled(curve: Curve) -> str:
-    """Words of a curve for the legend: its label and how the ring folds."""
+    """The text of a curve in the legend: its label and the folding mode."""
     cut = curve.case.cut
     end = "" if cut is None else f" (cut at {pi_times(round(cut / math.pi * 8), 8)})"
     return f"{curve.case.label}: {in_words(curve.mode)}{end}"
@@ -118,9 +117,9 @@ def legend_of_marks(
     kinds: Sequence[str] = tuple(KINDS),
     dot: str = "end of the curve",
 ) -> None:
-    """A line at the foot of the page that says what the marks are."""
-    there = {point.kind for curve in curves for point in curve.points}
-    handles = [style.entry(KINDS[kind], **mark(kind)) for kind in kinds if kind in there]
+    """The legend of the marks, at the foot of the page."""
+    occurring = {point.kind for curve in curves for point in curve.points}
+    handles = [style.entry(KINDS[kind], **mark(kind)) for kind in kinds if kind in occurring]
     handles.append(style.entry(dot, linestyle="none", marker=".", color=INK))
     style.legend_below(figure, handles)
 
@@ -133,28 +132,7 @@ def place(
 ) -> None:
     """Draw a bar, and its twisting axis if wanted, with the middle of its box at a point."""
     shift = np.array(at) - picture.box.mean(axis=0)
-    bar = PolyCollection(
-        list(picture.corners + shift),
-        facecolors=picture.colours,
-        edgecolors=picture.colours,
-        linewidths=0.25,
-        zorder=zorder,
-    )
-    panel.add_collection(bar)
+    rings.place_quadrilaterals(panel, picture.corners + shift, picture.colours, zorder=zorder)
     if axis:
         ends = (picture.axis + shift).T
         panel.plot(*ends, color=INK, linewidth=0.7, dashes=(4, 3), zorder=zorder - 0.5)
-
-
-def words(panel: Axes, at: Sequence[float], text: str, **options: Any) -> None:
-    """Text at a point of a panel."""
-    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9, "color": INK}
-    panel.text(at[0], at[1], text, **(look | options))
-
-
-def bare(panel: Axes, low: Sequence[float] | Array, high: Sequence[float] | Array) -> None:
-    """A panel without axes, one scale both ways, that shows a box."""
-    panel.set_xlim(low[0], high[0])
-    panel.set_ylim(low[1], high[1])
-    panel.set_aspect("equal")
-    panel.set_axis_off()

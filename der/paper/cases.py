@@ -1,14 +1,13 @@
-"""What the figures show: rings with their sections, and the states of their paths."""
+"""The contents of the figures: rings with their sections, and the states of their paths."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from der.bvp.solve import solve_bvp
@@ -17,8 +16,9 @@ from der.geometry.section import rectangular_section
 from der.records.configurations import Shapes
 from der.records.path import Mode, Path, Point
 from der.scene import Scene
-
-Array: TypeAlias = NDArray[np.float64]
+from der.utils.checks import Array
+from der.viz.curve import arc_length
+from der.viz.ribbon import unit
 
 STATES = 64  # at least, from gamma = 0 to pi: the spline through them is then within 6e-4 of
 PER = 8  # the panel of one through 1024, measured on every curve of the figures
@@ -29,7 +29,7 @@ ARRIVED = 1e-9  # rad
 
 @dataclass(frozen=True)
 class Case:
-    """A ring and the height over thickness of its section, with the words for them.
+    """A ring and the height over thickness of its section, with their labels.
 
     Parameters
     ----------
@@ -68,15 +68,9 @@ class Case:
         if save_at is None:
             turns = 1 if until is None else 2
             save_at = [math.pi * i / STATES for i in range(turns * STATES + 1)]
-        scene = Scene(
-            self.ring,
-            rectangular_section(h_over_t=self.h_over_t),
-            n_edges=N_EDGES,
-            shapes=shapes,
-            until=until,
-            save_at=save_at,
-        )
-        return solve_bvp(scene)
+        section = rectangular_section(h_over_t=self.h_over_t)
+        options: dict[str, Any] = {"shapes": shapes, "until": until, "save_at": save_at}
+        return solve_bvp(Scene(self.ring, section, n_edges=N_EDGES, **options))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,27 +129,22 @@ def curve_of(case: Case, path: Path) -> Curve:
 
 
 def solved(cases: Iterable[Case], **options: Any) -> list[Curve]:
-    """The curves of the cases, with states enough to be drawn; options are those of `solve`."""
+    """The curves of the cases; options are those of `solve`."""
     return [curve_of(case, case.solve(**options)) for case in cases]
 
 
 def smooth(curve: Curve) -> Array:
     """Points (gamma, moment, energy), (m, 3), of a smooth curve through all states.
 
-    The cubic spline over the chord length in all three, which turns with the path through folds.
+    It is the cubic spline over the chord length in all three, which can turn back at folds.
     """
     values = curve.states[:, :3]
-    values = values[np.append(True, np.diff(_chord(values)) > SAME)]
-    chord = _chord(values)
+    span = np.ptp(values, axis=0)
+    values = values[np.append(True, np.diff(arc_length(values / span)) > SAME)]
+    chord = arc_length(values / span)
     place = np.arange(PER * (len(chord) - 1) + 1) / PER
     points: Array = CubicSpline(chord, values)(np.interp(place, np.arange(len(chord)), chord))
     return points
-
-
-def _chord(values: Array) -> Array:
-    """Length up to every point, every column over its range."""
-    span = np.ptp(values, axis=0)
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(values / span, axis=0), axis=1)))
 
 
 def plain(words: str) -> str:
@@ -180,4 +169,4 @@ def at_vertices(curve: Curve, k: int) -> tuple[Array, Array]:
         raise ValueError(f"curve must have shapes to be drawn, got none for {curve.case.name!r}")
     d1 = curve.shapes.frames[k, :, 0]
     d1 = d1 + np.roll(d1, -1, axis=0)  # vertex j joins edges j and j + 1
-    return curve.shapes.x[k], d1 / np.linalg.norm(d1, axis=1, keepdims=True)
+    return curve.shapes.x[k], unit(d1)

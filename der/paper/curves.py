@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path as File
+from typing import Any
 
 from der.geometry.ring import Ring
 from der.geometry.shapes import circle, ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.cases import Case, Curve, in_words, plain, solved
 from der.utils.files import FilePath
+from der.viz.plots import style
 
 PLAIN = (1.0, 2.0, 3.0, 4.0)  # h/t
+FOLD_LINE: dict[str, Any] = {"color": canvas.QUIET, "linewidth": 0.7, "zorder": 1}
+FOLD_LINE["linestyle"] = (0, (1, 2))
 
 
 def families(rings: dict[str, Ring], cut: dict[float, float] | None = None) -> list[Case]:
@@ -73,18 +77,12 @@ def figc2(folder: FilePath) -> list[File]:
 def fig11(folder: FilePath) -> list[File]:
     """Two triangles that snap back: moments above, energies below."""
     curves = solved(
-        [
-            Case(
-                "$\\alpha_T$ = 120°, $r/a$ = 1/15, $h/t$ = 1",
-                triangle(math.radians(120), 1 / 15),
-                1.0,
-            ),
-            Case(
-                "$\\alpha_T$ = 90°, $r/a$ = 1/30, $h/t$ = 4",
-                triangle(math.radians(90), 1 / 30),
-                4.0,
-            ),
-        ]
+        Case(
+            f"$\\alpha_T$ = {d}°, $r/a$ = 1/{n}, $h/t$ = {h}",
+            triangle(math.radians(d), 1 / n),
+            float(h),
+        )
+        for d, n, h in ((120, 15, 1), (90, 30, 4))
     )
     figure = canvas.page(8.0, 5.8)
     grid = figure.add_gridspec(
@@ -112,12 +110,10 @@ def _name_folds(above: canvas.Axes, below: canvas.Axes, curve: Curve) -> None:
     for fold in curve.points:
         if fold.kind == "fold":
             for panel in (above, below):
-                panel.axvline(
-                    fold.gamma, color=canvas.QUIET, linewidth=0.7, linestyle=(0, (1, 2)), zorder=1
-                )
+                panel.axvline(fold.gamma, **FOLD_LINE)
             place = above.get_xaxis_transform()
             look = {"fontsize": 8, "va": "bottom", "transform": place}
-            canvas.words(above, (fold.gamma, 1.02), f"{fold.gamma:.4f}", **look)
+            style.place_text(above, (fold.gamma, 1.02), f"{fold.gamma:.4f}", **look)
 
 
 def _side_by_side(folder: FilePath, name: str, words: str, cases: Sequence[Case]) -> list[File]:
@@ -136,8 +132,8 @@ def _side_by_side(folder: FilePath, name: str, words: str, cases: Sequence[Case]
         colours = iter(canvas.COLOURS)
         for curve in curves:
             if curve.case.panel == name_of_panel:
-                words_of_curve = canvas.labelled(curve)
-                canvas.draw_curve(panel, curve, canvas.MOMENT, next(colours), words_of_curve)
+                label = canvas.labelled(curve)
+                canvas.draw_curve(panel, curve, canvas.MOMENT, next(colours), label)
         canvas.dress(panel, canvas.MOMENT)
         if i:
             panel.set_ylabel("")

@@ -7,8 +7,6 @@ where it snaps, dynamic relaxation finds the equilibrium in which it ends.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -21,9 +19,10 @@ from der.analysis.fold import fold
 from der.analysis.work import work
 from der.geometry.section import rectangular_section
 from der.paper.snapping_rings import SNAPPING
+from der.paper.tables import write_table
 from der.records.path import Path, Point
 from der.scene import Scene
-from der.utils.files import FilePath, write_whole
+from der.utils.files import FilePath
 
 EDGES = 128
 LOADS = tuple(np.linspace(0.0, math.pi, 321))  # states at these, so that integrals are accurate
@@ -120,18 +119,16 @@ def write_loops(loops: list[Loop], folder: FilePath) -> list[File]:
     from der.paper.canvas import save
     from der.paper.hysteresis_plot import figure_of_loops
 
-    text = io.StringIO(newline="")
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["ring", "way", "gamma", "moment", "energy"])
-    for one in loops:
+    rows = [
+        [one.name, way, *map(float, state)]
+        for one in loops
         for way, path, part in (
             ("equilibrium", one.equilibria, slice(None)),
             ("loading", one.turned, slice(0, one.top + 1)),
             ("unloading", one.turned, slice(one.top, None)),
-        ):
-            states = zip(path.gamma[part], path.moment[part], path.energy[part], strict=True)
-            table.writerows([one.name, way, *map(float, state)] for state in states)
-    content = text.getvalue().encode()
-    data = File(folder) / "hysteresis.csv"
-    write_whole(data, lambda file: file.write(content))
+        )
+        for state in zip(path.gamma[part], path.moment[part], path.energy[part], strict=True)
+    ]
+    columns = ("ring", "way", "gamma", "moment", "energy")
+    data = write_table(File(folder) / "hysteresis.csv", columns, rows)
     return [save(figure_of_loops(loops), File(folder) / "hysteresis.png"), data]

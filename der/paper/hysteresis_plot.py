@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from der.paper import canvas
-from der.paper.cases import Array
 from der.paper.hysteresis import Loop
 from der.records.path import Path
+from der.utils.checks import Array
 from der.viz import palette
 from der.viz.curve import smooth
 from der.viz.plots import style

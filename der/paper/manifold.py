@@ -1,4 +1,4 @@
-"""The circle's moment over twist and section: curves on the surface that they sweep."""
+"""The circle's moment over twist and section: curves, and the surface through them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from der.geometry.shapes import circle
 from der.paper import canvas
-from der.paper.cases import Array, Case, Curve, smooth, solved
+from der.paper.cases import Case, Curve, smooth, solved
+from der.utils.checks import Array
 from der.utils.files import FilePath
+from der.viz.curve import arc_length
 
 SHOWN = (1.0, 1.51, 1.6, 1.84, 2.0, 3.47, 4.0, 8.0)  # h/t
 # Here the first fold sits at pi: the path of a less flat section ends there, of a flatter one
@@ -22,6 +24,8 @@ SHOWN = (1.0, 1.51, 1.6, 1.84, 2.0, 3.47, 4.0, 8.0)  # h/t
 FOLDABLE_FROM = 1.507577
 NEAR = 1e-4  # of h/t, how close the sheets come to that edge
 ALONG = 121  # points along each path
+SURFACE: dict[str, Any] = {"color": "#d9e4ef", "alpha": 0.6, "linewidth": 0, "zorder": 1}
+SURFACE["lightsource"] = LightSource(azdeg=300, altdeg=45)
 TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 
 
@@ -55,18 +59,8 @@ def _draw_manifold(
     for sheet in sheets:
         gamma, moment = np.array([_resampled(curve) for curve in sheet]).transpose(2, 0, 1)
         h_over_t = np.array([[curve.case.h_over_t] * ALONG for curve in sheet])
-        panel.plot_surface(
-            gamma,
-            np.log(h_over_t),
-            moment,
-            rcount=len(sheet),
-            ccount=ALONG,
-            color="#d9e4ef",
-            alpha=0.6,
-            linewidth=0,
-            lightsource=LightSource(azdeg=300, altdeg=45),
-            zorder=1,
-        )
+        fine = {"rcount": len(sheet), "ccount": ALONG}
+        panel.plot_surface(gamma, np.log(h_over_t), moment, **fine, **SURFACE)
     for curve, colour in zip(curves, colours, strict=True):
         points = smooth(curve)
         level = np.full(len(points), math.log(curve.case.h_over_t))
@@ -75,9 +69,9 @@ def _draw_manifold(
     panel.set_yticks(np.log(TICKS), [f"{tick:g}" for tick in TICKS])
     panel.set_xlim(0, math.pi)
     panel.set_ylim(0, math.log(8.0))
-    panel.set_xlabel("$\\gamma$", fontsize=10, color=canvas.INK)
-    panel.set_ylabel("$h/t$ (logarithmic)", fontsize=9, color=canvas.INK)
-    panel.set_zlabel("$M\\,R/GJ$", fontsize=10, color=canvas.INK)
+    labels = {"x": ("$\\gamma$", 10), "y": ("$h/t$ (logarithmic)", 9), "z": ("$M\\,R/GJ$", 10)}
+    for name, (label, size) in labels.items():
+        getattr(panel, f"set_{name}label")(label, fontsize=size, color=canvas.INK)
     panel.tick_params(labelsize=8, pad=0, labelcolor=canvas.INK)
     panel.view_init(elev=28, azim=-58)
     panel.set_box_aspect((1.25, 1.35, 0.85), zoom=0.95)
@@ -94,7 +88,6 @@ def _draw_flat(panel: Axes, curves: list[Curve], colours: list[Any]) -> None:
 def _resampled(curve: Curve) -> Array:
     """Points (gamma, moment) of a curve, evenly spread over its length in the panel."""
     points = smooth(curve)[:, :2]
-    steps = np.diff(points, axis=0) / (math.pi, 2.5)
-    way = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=1)))
-    even = np.linspace(0.0, way[-1], ALONG)
-    return np.column_stack([np.interp(even, way, column) for column in points.T])
+    length = arc_length(points / (math.pi, 2.5))
+    even = np.linspace(0.0, length[-1], ALONG)
+    return np.column_stack([np.interp(even, length, column) for column in points.T])

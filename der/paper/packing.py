@@ -17,47 +17,33 @@ from der.geometry.ring import Ring
 from der.geometry.shapes import ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.canvas import INK, QUIET
-from der.paper.cases import Array
-from der.utils.files import FilePath, write_whole
-from der.viz.plots import style
+from der.paper.tables import write_table
+from der.utils.checks import Array
+from der.utils.files import FilePath
+from der.viz.plots import rings, style
 
 MAP_POINTS = 720  # on a ring of a map: packing ratios to about 1e-7
 SHAPE_POINTS = 600
 FOLDED, FLAT = "#0072B2", "#bdbdbd"  # blue of Okabe and Ito
 LETTERS = "ABCDEFGH"
 DOT = style.mark("o", 4.5) | {"zorder": 4}
-# of contours of fig. 9: away from the jump
+# places of the labels of contours of fig. 9: away from the jump
 LABELS = (
-    (38, 0.28),
-    (38, 0.24),
-    (38, 0.16),
-    (36, 0.09),
-    (76, 0.19),
-    (76, 0.16),
-    (76, 0.11),
-    (76, 0.05),
+    *((38, 0.28), (38, 0.24), (38, 0.16), (36, 0.09)),
+    *((76, 0.19), (76, 0.16), (76, 0.11), (76, 0.05)),
 )
 ELLIPSES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0)  # b/a of the insets
-RECTANGLES = (  # (b/a, r/a)
-    (0.2, 0.1),
-    (0.2, 0.2),
-    (0.6, 0.1),
-    (0.6, 0.3),
-    (0.6, 0.6),
-    (1.0, 0.1),
-    (1.0, 0.5),
-    (1.0, 1.0),
-)
-TRIANGLES = (  # (vertex angle in degrees, r/a)
-    (30.0, 0.033),
-    (30.0, 0.2),
-    (30.0, 0.35),
-    (60.0, 0.05),
-    (60.0, 0.2),
-    (90.0, 0.033),
-    (90.0, 0.15),
-    (120.0, 1 / 30),
-)
+RECTANGLES = {  # r/a by b/a
+    0.2: (0.1, 0.2),
+    0.6: (0.1, 0.3, 0.6),
+    1.0: (0.1, 0.5, 1.0),
+}
+TRIANGLES = {  # r/a by the vertex angle in degrees
+    30.0: (0.033, 0.2, 0.35),
+    60.0: (0.05, 0.2),
+    90.0: (0.033, 0.15),
+    120.0: (1 / 30,),
+}
 
 
 def fig3b(folder: FilePath, columns: int = 51) -> list[Path]:
@@ -82,7 +68,11 @@ def fig6(folder: FilePath, columns: int = 49) -> list[Path]:
     b, share = _grid(0.2, 1.0, columns)
     r = 0.1 + share * (b - 0.1)
     ratio = np.vectorize(lambda b, r: packing_ratio(rectangle(b, r), MAP_POINTS))(b, r)
-    marks = [_Mark((c, r), rectangle(c, r), f"{c:.2g}, {r:.2g}") for c, r in RECTANGLES]
+    marks = [
+        _Mark((c, r), rectangle(c, r), f"{c:.2g}, {r:.2g}")
+        for c, radii in RECTANGLES.items()
+        for r in radii
+    ]
     figure = _map_figure(b, r, ratio, marks, "$b/a,\\ r/a$")
     axes = figure.axes[0]
     style.label_axes(axes, "aspect ratio  $b/a$", "fillet radius  $r/a$", fontsize=10)
@@ -106,7 +96,9 @@ def fig9(folder: FilePath, columns: int = 22) -> list[Path]:
         degrees, r
     )
     marks = [
-        _Mark((d, r), triangle(math.radians(d), r), f"{d:.0f}°, {r:.2g}") for d, r in TRIANGLES
+        _Mark((d, r), triangle(math.radians(d), r), f"{d:.0f}°, {r:.2g}")
+        for d, radii in TRIANGLES.items()
+        for r in radii
     ]
     figure = _map_figure(degrees, r, ratio, marks, "$\\alpha_T,\\ r/a$", LABELS)
     axes = figure.axes[0]
@@ -141,10 +133,9 @@ def _grid(first: float, last: float, columns: object) -> tuple[Array, Array]:
 
 def _written(folder: FilePath, name: str, figure: Figure, table: dict[str, Array]) -> list[Path]:
     """Write the picture and its numbers."""
-    csv = Path(folder) / f"{name}.csv"
     rows = np.column_stack([np.ravel(column) for column in table.values()])
-    header = ",".join(table)
-    write_whole(csv, lambda file: np.savetxt(file, rows, "%.10g", ",", header=header, comments=""))
+    texts = [[f"{value:.10g}" for value in row] for row in rows]
+    csv = write_table(Path(folder) / f"{name}.csv", table, texts)
     return [canvas.save(figure, Path(folder) / f"{name}.png"), csv]
 
 
@@ -217,10 +208,7 @@ def _contours(
     axes.margins(0.04)
     figure = axes.figure
     bar = figure.colorbar(filled, cax=figure.add_axes((0.545, 0.115, 0.014, 0.835)))
-    bar.set_ticks([v for v in levels if round(40 * v) % 4 == 0])
-    bar.set_label("packing ratio", fontsize=10, color=INK)
-    bar.ax.tick_params(labelsize=8.5, labelcolor=INK, color=QUIET)
-    bar.outline.set_visible(False)
+    style.dress_bar(bar, "packing ratio", [v for v in levels if round(40 * v) % 4 == 0], 9.5)
 
 
 def _draw_shapes(axes: Axes, ring: Ring) -> None:
@@ -230,7 +218,6 @@ def _draw_shapes(axes: Axes, ring: Ring) -> None:
     points = folded(ring, SHAPE_POINTS).points
     points = np.append(points, points[:1], axis=0)
     for curve, colour, width in ((flat, FLAT, 0.9), (points, FOLDED, 1.1)):
-        middle = (curve.min(axis=0) + curve.max(axis=0)) / 2
-        axes.plot(*(curve - middle).T, color=colour, linewidth=width)
+        axes.plot(*(curve - rings.box_middle(curve)).T, color=colour, linewidth=width)
     axes.set_aspect("equal")
     axes.set_axis_off()

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path as File
 
 import numpy as np
 from matplotlib.colors import to_rgb
 
+from der.geometry.ring import Ring
 from der.geometry.shapes import ellipse, rectangle, triangle
 from der.paper import canvas
-from der.paper.bars import Camera, bar, camera
+from der.paper.bars import bar, camera
 from der.paper.cases import Case, Curve, at_vertices, in_words, solved
 from der.utils.files import FilePath
+from der.viz.plots import rings, style
+from der.viz.ribbon import Camera
 
 H_OVER_T = 4.0
 INSCRIBED = math.tan(math.radians(15)) / 2  # circle in the triangle of 120 degrees, radius over a
@@ -42,61 +46,45 @@ class Panel:
 
 def figd1(folder: FilePath) -> list[File]:
     """Ellipses, h/t = 4, about either axis."""
+    rings = {f"$b/a$ = {b:g}": partial(ellipse, b) for b in (1.0, 0.85, 0.7, 0.6)}
     panels = [
-        Panel(
-            f"({letter}) Ellipses about the {axis} axis, $h/t$ = 4",
-            [
-                Case(f"$b/a$ = {b:g}", ellipse(b, axis), H_OVER_T, f"({letter}) {axis} axis")
-                for b in (1.0, 0.85, 0.7, 0.6)
-            ],
-            view,
-        )
-        for letter, axis, view in (("a", "x", LEVEL), ("b", "y", UPRIGHT))
+        _panel(f"({letter})", f"Ellipses about the {axis} axis", rings, axis)
+        for letter, axis in zip("ab", "xy", strict=True)
     ]
     return _profiles(folder, "figD1", panels, "ellipses, h/t = 4")
 
 
 def figd2(folder: FilePath) -> list[File]:
     """Rounded rectangles, h/t = 4, about either axis; squares with different fillets."""
-    panels = [
-        Panel(
-            f"(a) $r/a$ = 0.3, about the {axis} axis, $h/t$ = 4",
-            [
-                Case(f"$b/a$ = {b:g}", rectangle(b, 0.3, axis), H_OVER_T, f"(a) {axis} axis")
-                for b in (1.0, 0.8, 0.6, 0.4)
-            ],
-            view,
-        )
-        for axis, view in (("x", LEVEL), ("y", UPRIGHT))
-    ]
-    squares = [
-        Case(f"$r/a$ = {r:g}", rectangle(1.0, r), H_OVER_T, "(b)") for r in (0.1, 0.3, 0.6, 1.0)
-    ]
-    panels.append(Panel("(b) $b/a$ = 1, $h/t$ = 4", squares, LEVEL))
+    rings = {f"$b/a$ = {b:g}": partial(rectangle, b, 0.3) for b in (1.0, 0.8, 0.6, 0.4)}
+    squares = {f"$r/a$ = {r:g}": rectangle(1.0, r) for r in (0.1, 0.3, 0.6, 1.0)}
+    panels = [_panel("(a)", f"$r/a$ = 0.3, about the {axis} axis", rings, axis) for axis in "xy"]
+    panels.append(Panel("(b) $b/a$ = 1, $h/t$ = 4", _cases(squares, "(b)"), LEVEL))
     return _profiles(folder, "figD2", panels, "rounded rectangles, h/t = 4")
 
 
 def figd3(folder: FilePath) -> list[File]:
     """Rounded triangles, h/t = 4: different angles, different fillets."""
-    angles = [
-        Case(f"$\\alpha_T$ = {d}°", triangle(math.radians(d), 1 / 30), H_OVER_T, "(a)")
-        for d in (60, 75, 90, 120)
-    ]
-    # the paper's own r/a = R_C/2 = 1/15, and not 2/15, which R_C is but for half a percent
-    fillets = [
-        Case(f"$r/a$ = {words}", triangle(math.radians(120), r), H_OVER_T, "(b)")
-        for words, r in (
-            ("1/30", 1 / 30),
-            ("1/15", 1 / 15),
-            ("1/10", 1 / 10),
-            ("$R_C/a$", INSCRIBED),
-        )
-    ]
+    angles = {f"$\\alpha_T$ = {d}°": triangle(math.radians(d), 1 / 30) for d in (60, 75, 90, 120)}
+    # the paper's r/a = R_C/2 = 1/15, and not 2/15, which is R_C within half a percent
+    fillets = {"1/30": 1 / 30, "1/15": 1 / 15, "1/10": 1 / 10, "$R_C/a$": INSCRIBED}
+    obtuse = {f"$r/a$ = {name}": triangle(math.radians(120), r) for name, r in fillets.items()}
     panels = [
-        Panel("(a) $r/a$ = 1/30, $h/t$ = 4", angles, UPRIGHT),
-        Panel("(b) $\\alpha_T$ = 120°, $h/t$ = 4", fillets, UPRIGHT),
+        Panel("(a) $r/a$ = 1/30, $h/t$ = 4", _cases(angles, "(a)"), UPRIGHT),
+        Panel("(b) $\\alpha_T$ = 120°, $h/t$ = 4", _cases(obtuse, "(b)"), UPRIGHT),
     ]
     return _profiles(folder, "figD3", panels, "rounded triangles, h/t = 4")
+
+
+def _panel(letter: str, title: str, rings: Mapping[str, Callable[[str], Ring]], axis: str) -> Panel:
+    """Rings about one twisting axis."""
+    cases = _cases({label: ring(axis) for label, ring in rings.items()}, f"{letter} {axis} axis")
+    return Panel(f"{letter} {title}, $h/t$ = 4", cases, LEVEL if axis == "x" else UPRIGHT)
+
+
+def _cases(rings: Mapping[str, Ring], panel: str) -> list[Case]:
+    """The cases of rings, by label, in a panel."""
+    return [Case(label, ring, H_OVER_T, panel) for label, ring in rings.items()]
 
 
 def _profiles(folder: FilePath, name: str, panels: Sequence[Panel], about: str) -> list[File]:
@@ -123,7 +111,7 @@ def _profiles(folder: FilePath, name: str, panels: Sequence[Panel], about: str) 
 
 
 def _draw_rings(row: canvas.Axes, curves: Sequence[Curve], view: Camera) -> None:
-    """Draw the rings flat, in grey, and over them at the end of their paths, and name them."""
+    """Draw the flat rings in grey, over them the rings at the end of their paths; name them."""
     slot = _slot(curves)
     for i, (curve, colour) in enumerate(zip(curves, canvas.COLOURS, strict=False)):
         before, after = (
@@ -134,10 +122,10 @@ def _draw_rings(row: canvas.Axes, curves: Sequence[Curve], view: Camera) -> None
         canvas.place(row, after, (i * slot, 0.0), axis=False, zorder=3.0)
         words = curve.case.label + "\n" + in_words(curve.mode).replace(", ", ",\n")
         look = {"fontsize": 8, "color": colour, "va": "top", "linespacing": 1.15}
-        canvas.words(row, (i * slot, -0.53 * slot), words, **look)
+        style.place_text(row, (i * slot, -0.53 * slot), words, **look)
     wide = len(curves) * slot
     top = 0.52 * slot
-    canvas.bare(row, (-slot / 2, top - wide * ROW[1] / ROW[0]), (wide - slot / 2, top))
+    rings.bare(row, (-slot / 2, top - wide * ROW[1] / ROW[0]), (wide - slot / 2, top))
 
 
 def _slot(curves: Sequence[Curve]) -> float:

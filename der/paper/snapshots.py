@@ -10,10 +10,12 @@ import numpy as np
 from der.geometry.ring import Ring
 from der.geometry.shapes import circle, ellipse, rectangle, triangle
 from der.paper import canvas
-from der.paper.bars import Camera, Picture, bar, camera
+from der.paper.bars import Picture, bar, camera
 from der.paper.cases import Case, Curve, at_vertices, in_words, plain, solved
 from der.paper.tables import write_shapes
 from der.utils.files import FilePath
+from der.viz.plots import rings, style
+from der.viz.ribbon import Camera
 
 EIGHTHS = (0, 2, 4, 5, 6, 7, 8)  # of pi: the snapshots; the ring moves most near the end
 WIDTH = 10.0  # inches
@@ -83,18 +85,18 @@ def _page(words: str, curves: list[Curve], pictures: list[list[Picture]]) -> can
     high = np.array([widths.sum(), 3.0 * line])
     figure = canvas.page(WIDTH, WIDTH * (high - low)[1] / (high - low)[0])
     panel = figure.add_axes((0, 0, 1, 1))
-    canvas.words(panel, (widths.sum() / 2, 2.1 * line), words, fontsize=11)
+    style.place_text(panel, (widths.sum() / 2, 2.1 * line), words, fontsize=11)
     for x, k in zip(middles, EIGHTHS, strict=True):
-        canvas.words(panel, (x, 0.4 * line), f"$\\gamma$ = {canvas.pi_times(k, 8)}")
+        style.place_text(panel, (x, 0.4 * line), f"$\\gamma$ = {canvas.pi_times(k, 8)}")
     top = 0.0
     for curve, row, height in zip(curves, pictures, heights, strict=True):
         title = f"{curve.case.label}: {in_words(curve.mode)}"
-        canvas.words(panel, (0.6 * line, top - line), title, ha="left", fontsize=9.5)
+        style.place_text(panel, (0.6 * line, top - line), title, ha="left", fontsize=9.5)
         top -= 1.7 * line
         for x, picture in zip(middles, row, strict=True):
             canvas.place(panel, picture, (x, top - height / 2))
         top -= height + 0.3 * line
     small = {"fontsize": 7.5, "color": canvas.QUIET}
-    canvas.words(panel, (widths.sum() / 2, low[1] + 0.9 * line), NOTE, **small)
-    canvas.bare(panel, low, high)
+    style.place_text(panel, (widths.sum() / 2, low[1] + 0.9 * line), NOTE, **small)
+    rings.bare(panel, low, high)
     return figure

@@ -29,6 +29,7 @@ STATE_COLUMNS = {
     "error_moment": "of the moment [GJ/a]",
     "error_energy": "of the energy [GJ/a]",
 }
+PLACE = ("r1", "r2", "r3", "d11", "d12", "d13")
 POINT_COLUMN = {"point": "fold: gamma turns back; limit: the moment turns back; else empty"}
 
 
@@ -46,13 +47,12 @@ def write_curves(file: FilePath, about: str, curves: Iterable[Curve]) -> File:
 def write_shapes(file: FilePath, about: str, shots: Iterable[tuple[Curve, int]]) -> File:
     """Write the table of the ring in some states (curve, position); return the file."""
     shots = list(shots)
-    place = ("r1", "r2", "r3", "d11", "d12", "d13")
     columns = STATE_COLUMNS | {
         "arc_length": "of the vertex from the first grip [a]",
         **dict.fromkeys(
-            place[:3], "position of the vertex along E1 or E2 or E3 (twisting axis) [a]"
+            PLACE[:3], "position of the vertex along E1 or E2 or E3 (twisting axis) [a]"
         ),
-        **dict.fromkeys(place[3:], "component of the director d1, along the section's height"),
+        **dict.fromkeys(PLACE[3:], "component of the director d1, along the section's height"),
     }
     rows = []
     for curve, k in shots:
@@ -74,13 +74,23 @@ def _write(
     columns: Mapping[str, str],
     rows: Iterable[Sequence[str]],
 ) -> File:
-    """Write a table: lines of words that begin with #, the columns' names, and the rows."""
+    """Write a table of cases: comments that begin with #, the columns' names, and the rows."""
     columns = {"case": "which curve", **RING_COLUMNS, **columns}
     modes = {curve.case.name: plain(in_words(curve.mode)) for curve in curves}
+    named = "; ".join(f"{name}: {words}" for name, words in columns.items())
+    modes_named = "modes: " + "; ".join(f"{name}: {mode}" for name, mode in modes.items())
+    return write_table(file, columns, rows, (about, named, modes_named))
+
+
+def write_table(
+    file: FilePath,
+    columns: Iterable[str],
+    rows: Iterable[Sequence[object]],
+    comments: Sequence[str] = (),
+) -> File:
+    """Write a table: comments, the columns' names, and the rows; return the file."""
     text = io.StringIO(newline="")
-    text.write(f"# {about}\n")
-    text.write("# " + "; ".join(f"{name}: {words}" for name, words in columns.items()) + "\n")
-    text.write("# modes: " + "; ".join(f"{name}: {mode}" for name, mode in modes.items()) + "\n")
+    text.writelines(f"# {comment}\n" for comment in comments)
     table = csv.writer(text, lineterminator="\n")
     table.writerow(columns)
     table.writerows(rows)

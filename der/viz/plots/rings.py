@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
 from der.utils.checks import Array
-from der.viz.ribbon import Camera, projected
+from der.viz.ribbon import Camera, projected, unit
 
 TILT = math.radians(42.0)  # of the view off the normal of the plane closest to a shape
 LARGER = 2.0  # small shapes are drawn, at most, over the scale of the largest
@@ -26,16 +27,15 @@ def closed_curve(x: Array, points: int = 200) -> Array:
 
 
 def oblique(x: Array, level: Array | None = None) -> Camera:
-    """The camera that sees a shape from off the normal of the plane closest to it.
+    """The camera whose view of a shape is inclined to the normal of the plane closest to it.
 
-    The longest axis lies level, or the direction ``level`` (3,) if that is given. Of the two sides,
-    the one of +E1, or else +E3, is seen.
+    The longest axis is level, or the direction ``level`` (3,) if that is given. The camera sees the
+    side of +E1, or else of +E3.
     """
     right, up, normal = np.linalg.svd(x - x.mean(axis=0), full_matrices=False)[2]
     if level is not None:
-        right = level - (level @ normal) * normal
-        right = right / np.linalg.norm(right)
-    elif np.ptp(x @ right) < 1.02 * np.ptp(x @ up):  # round: any axis would do
+        right = unit(level - (level @ normal) * normal)
+    elif np.ptp(x @ right) < 1.02 * np.ptp(x @ up):  # a circle: no axis is the longest
         right = np.array([0.0, 1.0, 0.0]) - normal[1] * normal
         size = float(np.linalg.norm(right))
         right = right / size if size > 0.1 else up
@@ -46,7 +46,7 @@ def oblique(x: Array, level: Array | None = None) -> Camera:
 
 
 def strands_apart(x: Array, share: float) -> Array:
-    """Vertices of a ring that lies on itself, with its strands moved apart by a share of size."""
+    """Vertices of a ring with coincident strands, moved apart by a share of its size."""
     middle = x.mean(axis=0)
     turn = 2.0 * math.pi * np.arange(len(x))[:, None] / len(x)
     moved: Array = middle + (x - middle) * (1.0 + share * np.cos(turn))
@@ -93,12 +93,16 @@ def place_ribbon(
     """Draw a ribbon (`ribbon.quadrilaterals`) with the middle of its box at a place."""
     corners, colours = ribbon
     placed = scale * (corners - box_middle(corners)) + np.array(at)
-    axes.add_collection(
-        PolyCollection(list(placed), facecolors=colours, edgecolors=colours, linewidths=0.25)
-    )
+    place_quadrilaterals(axes, placed, colours)
 
 
-def bare(axes: Axes, low: tuple[float, float], high: tuple[float, float]) -> None:
+def place_quadrilaterals(axes: Axes, corners: Array, colours: Array, **look: Any) -> None:
+    """Draw quadrilaterals (m, 4, 2) in their colours (m, 3), without gaps between them."""
+    look |= {"facecolors": colours, "edgecolors": colours, "linewidths": 0.25}
+    axes.add_collection(PolyCollection(list(corners), **look))
+
+
+def bare(axes: Axes, low: Sequence[float] | Array, high: Sequence[float] | Array) -> None:
     """Axes without lines and ticks, with equal scales, which show the box from low to high."""
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
@@ -110,4 +114,4 @@ def draw_closed(axes: Axes, x: Array, colour: str, half: float) -> None:
     """Draw a closed curve (n, 2) in the middle of axes that reach ``half`` to its sides."""
     axes.plot(*x.T, color=colour, linewidth=1.6, solid_joinstyle="round")
     middle = box_middle(x)
-    bare(axes, tuple(middle - half), tuple(middle + half))
+    bare(axes, middle - half, middle + half)
