@@ -143,8 +143,7 @@ def smooth(curve: Curve) -> Array:
     values = values[np.append(True, np.diff(arc_length(values / span)) > SAME)]
     chord = arc_length(values / span)
     place = np.arange(PER * (len(chord) - 1) + 1) / PER
-    points: Array = CubicSpline(chord, values)(np.interp(place, np.arange(len(chord)), chord))
-    return points
+    return CubicSpline(chord, values)(np.interp(place, np.arange(len(chord)), chord))
 
 
 def plain(words: str) -> str:

@@ -17,12 +17,12 @@ from der.utils.files import FilePath
 
 @dataclass(frozen=True)
 class Drawn:
-    """What became of figures, by name.
+    """The results of drawing figures, by name.
 
     Attributes
     ----------
     written : their files
-    failed : what went wrong, in a sentence
+    failed : their errors, in a sentence each
     """
 
     written: Mapping[str, list[File]]
@@ -52,9 +52,9 @@ def draw_all(
     Raises
     ------
     ValueError
-        For a number of workers below 1, or a folder that is none and cannot be made.
+        For a number of workers below 1, or a folder that does not exist and cannot be made.
     Interrupted
-        At Ctrl-C; has what was finished until then.
+        At Ctrl-C; it has the figures that were finished.
     """
     workers = processes(workers)
     _make(folder)
@@ -86,7 +86,7 @@ def draw_all(
 
 
 def _make(folder: FilePath) -> None:
-    """Make the folder unless it is there."""
+    """Make the folder unless it exists."""
     try:
         File(folder).mkdir(parents=True, exist_ok=True)
     except OSError as problem:
@@ -97,13 +97,13 @@ def _make(folder: FilePath) -> None:
 
 
 def _ignore_ctrl_c() -> None:
-    """Leave Ctrl-C to the parent; being ended, leave by an exception, so that files are tidied."""
+    """Ignore Ctrl-C, which the parent handles; end by an exception, so that files are removed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
 
 
 def _with_progress(tasks: Mapping[Future[list[File]], str]) -> Iterator[Future[list[File]]]:
-    """The tasks as they finish, with a bar where somebody looks at it."""
+    """The tasks as they finish, with a progress bar on a terminal."""
     if not sys.stderr.isatty():
         yield from as_completed(tasks)
         return

@@ -1,7 +1,7 @@
-"""The table of all figures, and how they are drawn side by side.
+"""The table of all figures, and their drawing side by side.
 
-A figure's module, and with it solver and matplotlib, is imported when the figure is drawn, so that
-the table costs nothing.
+The module of a figure imports the solver and matplotlib. It is imported when the figure is drawn,
+so that the table costs no time.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _draw_figure(name: str, folder: FilePath) -> list[File]:
 def _draw_diagram(
     name: str, folder: FilePath, workers: int | None, warn: Callable[[str], object]
 ) -> list[File]:
-    """Draw a phase diagram in a folder of its own; the cases that are there are not repeated."""
+    """Draw a phase diagram in its own folder; cases that are solved there are not repeated."""
     from der.diagram.diagram import doubts, phase_diagram
 
     diagram = phase_diagram(name, File(folder) / name, workers=workers, resume=True)
@@ -73,28 +73,28 @@ def draw(
     *,
     warn: Callable[[str], object] = lambda words: None,
 ) -> Drawn:
-    """Draw figures side by side, one thread each, and say what was written.
+    """Draw figures side by side, one thread each, and return the files.
 
     New Python processes are started, so a script calls this under ``if __name__ == "__main__"``.
 
     Parameters
     ----------
     names : of FIGURES, and of DIAGRAMS, which take half a minute each, those of cubes four minutes
-    folder : where the files go; made if it is not there
+    folder : of the files; it is made if it does not exist
     workers : how many figures at a time; None: as many as there are cores
-    warn : told, in a line each, what the boundaries of a diagram leave open
+    warn : called with a line for each open question about the boundaries of a diagram
 
     Returns
     -------
     Drawn
-        A figure that fails is in `failed`, and the others are drawn all the same.
+        A figure that fails is in `failed`; the others are drawn.
 
     Raises
     ------
     ValueError
         For an unknown name, a number of workers below 1, or a folder that cannot be made.
     Interrupted
-        At Ctrl-C; has what was finished until then. No half-written file is left.
+        At Ctrl-C; it has the figures that were finished. No incomplete file is left.
     """
     known = {**FIGURES, **DIAGRAMS}
     for name in names:

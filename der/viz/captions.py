@@ -1,4 +1,4 @@
-"""Texts that accompany an motion: captions of its steps, events, and what is shown."""
+"""Texts of an animation: captions of its steps, events, and what is shown."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from der.viz.animation import Motion
 from der.viz.palette import POINTS
 from der.viz.titles import names, plain
 
-STAYS = 0.12  # of an motion: how long a caption names the last special point
+STAYS = 0.12  # share of the steps during which a caption names a special point
 SHOWN = """\
 Colour: energy of bending (left) and of twisting (right) per length, from 0 to {top:.4g} GJ/a².
 
-Black arrows: how far the grips have turned. Vermilion arrows: the moment on each grip, along the \
+Black arrows: rotations of the grips. Vermilion arrows: the moment on each grip, along the \
 twisting axis. Green: the path of the free points."""
 
 
@@ -32,12 +32,12 @@ def event_text(point: Point) -> str:
 
 @dataclass(frozen=True)
 class Caption:
-    """What is said of one step of an motion."""
+    """The texts of one step of a motion."""
 
     numbers: str  # gamma, M and U
-    stability: str  # stable, unstable with its index, or snapping; "" where nothing is known
+    stability: str  # stable, unstable with its index, or snapping; "" where it is not known
     stable: bool | None  # None: not known
-    event: str  # the special point that was just passed; "" a little after it
+    event: str  # the last special point, for STAYS of the steps; else ""
     way: str = ""  # "loading" or "unloading", where the ring is also unloaded
 
     @property
@@ -47,7 +47,7 @@ class Caption:
 
 
 def captions(path: Path, motion: Motion) -> list[Caption]:
-    """The caption of every step, also of one between two states."""
+    """The caption of every step, also of steps between two states."""
     index = path.index.tolist()
     stays = max(1, round(STAYS * len(motion.x)))
     turn = _turned_back(path)
@@ -56,7 +56,7 @@ def captions(path: Path, motion: Motion) -> list[Caption]:
     for step, k in enumerate(motion.position.tolist()):
         reached = max(reached, k)
         known = None
-        if k >= 0:  # a singular state leaves it to the one after it
+        if k >= 0:  # a singular state has no index: that of the next one is taken
             known = index[k] if index[k] is not None else index[min(k + 1, len(index) - 1)]
         last = [point for at, point in passed if at <= step < at + stays][-1:]
         found.append(
@@ -74,9 +74,12 @@ def captions(path: Path, motion: Motion) -> list[Caption]:
 def _numbers(motion: Motion, step: int) -> str:
     """Gamma, M and U of a step."""
     moment = motion.moment[step]
-    parts = [f"γ = {_digits(motion.gamma[step] / math.pi)} π"]
-    parts += [] if math.isnan(moment) else [f"M = {_digits(moment)} GJ/a"]
-    return "   ".join([*parts, f"U = {_digits(motion.energy[step])} GJ/a"])
+    parts = [
+        f"γ = {_digits(motion.gamma[step] / math.pi)} π",
+        "" if math.isnan(moment) else f"M = {_digits(moment)} GJ/a",
+        f"U = {_digits(motion.energy[step])} GJ/a",
+    ]
+    return "   ".join(filter(None, parts))
 
 
 def _stability(index: int | None) -> str:
@@ -96,7 +99,7 @@ def _turned_back(path: Path) -> int | None:
 
 
 def _digits(value: float) -> str:
-    """Three decimals, and no -0.000."""
+    """Three decimals, without -0.000."""
     return f"{value + 0.0:z.3f}"
 
 
@@ -108,7 +111,7 @@ def about(path: Path, motion: Motion) -> str:
     states = f"{len(path)} equilibria."
     if len(motion.x) > len(path):
         transient = len(motion.x) - len(path)
-        states += f" {transient} steps between them are snaps in slow motion, no equilibria."
+        states += f" {transient} steps between them are snaps in slow motion, not equilibria."
     parts = [
         f"# {names([path])[0]}",
         f"The section is drawn {scale}: h = {h:.4g} a, t = {t:.4g} a.",

@@ -94,8 +94,7 @@ def spline(chord: Array, values: Array, place: Array) -> Array:
     if np.count_nonzero(is_new) == 1:
         return np.repeat(values[:1], len(place), axis=0)
     at = np.interp(place, np.arange(len(chord)), chord)
-    curve: Array = CubicSpline(chord[is_new], values[is_new], bc_type="natural")(at)
-    return curve
+    return CubicSpline(chord[is_new], values[is_new], bc_type="natural")(at)
 
 
 def chord_length(path: Path) -> Array:

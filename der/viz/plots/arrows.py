@@ -1,4 +1,4 @@
-"""Arrows between points of a picture: bent around other points, apart from each other, labelled.
+"""Arrows between points of a picture, with labels: bent so that they avoid points and each other.
 
 All places are in pixels. An arrow is the parabola of matplotlib's `arc3`: its control point lies
 `bend` times the chord off the chord's middle.
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from der.utils.checks import Array
 
-# bends that are tried, gentle ones first
+# bends to try, small ones first
 _BENDS = (0.1, -0.1, 0.16, -0.16, 0.22, -0.22, 0.29, -0.29, 0.37, -0.37, 0.46, -0.46, 0.6, -0.6)
-_FINE = np.linspace(0.0, 1.0, 61)  # points of an arrow that are looked at
-_SHARED = 3.0  # clearances around a common end in which arrows may come close
+_FINE = np.linspace(0.0, 1.0, 61)  # points of an arrow at which distances are measured
+_SHARED = 3.0  # clearances around a common end within which arrows may be close
 _PLACES = np.linspace(0.14, 0.86, 37)  # of a label along its arrow
-_MIDDLE = 0.36  # where a label lies best: near the start, as ends are shared
+_MIDDLE = 0.36  # best place of a label: near the start, because arrows share their ends
 LETTERS = 6.8  # points: size of the letters of a label
 
 
@@ -27,8 +27,7 @@ def arc(start: Array, end: Array, bend: float, t: Array = _FINE) -> Array:
     chord = end - start
     control = 0.5 * (start + end) + bend * np.array([chord[1], -chord[0]])
     t = t[:, None]
-    found: Array = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * control + t**2 * end
-    return found
+    return (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * control + t**2 * end
 
 
 def bends(
@@ -38,15 +37,15 @@ def bends(
 
     Parameters
     ----------
-    points : (n, 2), which arrows join, and which others stay clear of.
+    points : (n, 2), which arrows join, and which other arrows avoid.
     pairs : start and end of each arrow, as positions in ``points``.
-    clear : distance from an arrow to a point that is not its own, and to other arrows.
-    box : lower left and upper right corner (2,): arrows stay inside.
+    clear : least distance of an arrow from other arrows and from points that it does not join.
+    box : lower left and upper right corner (2,) of the region of the arrows.
     """
     found = [0.0] * len(pairs)
     drawn: list[tuple[tuple[int, int], Array]] = []
     chords = [float(np.linalg.norm(points[b] - points[a])) for a, b in pairs]
-    for k in sorted(range(len(pairs)), key=lambda k: (chords[k], pairs[k])):  # short ones are bound
+    for k in sorted(range(len(pairs)), key=lambda k: (chords[k], pairs[k])):  # short ones first
         start, end = (points[i] for i in pairs[k])
         others = np.delete(points, pairs[k], axis=0)
         costs = []
@@ -69,7 +68,7 @@ def half_sizes(texts: Sequence[str], dpi: float) -> list[Array]:
 def label_places(
     points: Array, arcs: Sequence[Array], half: Sequence[Array], clear: float
 ) -> list[Array]:
-    """Where the middle of each arrow's label lies: on it, off points, other arrows and labels.
+    """The middle of each arrow's label: on the arrow, away from points, other arrows and labels.
 
     Parameters
     ----------
@@ -79,26 +78,25 @@ def label_places(
     """
     found: list[Array] = []
     for k, curve in enumerate(arcs):
+        others = [*arcs[:k], *arcs[k + 1 :]]
         t = np.linspace(0.0, 1.0, len(curve))
         spots = np.column_stack([np.interp(_PLACES, t, values) for values in curve.T])
         costs = []
         for place, at in zip(_PLACES, spots, strict=True):
-            cost = 2.0 * abs(place - _MIDDLE)
-            cost += 20.0 * np.sum(_within(points, at, half[k] + clear))
-            for i, other in enumerate(arcs):
-                if i != k:
-                    cost += 5.0 * np.any(_within(other, at, half[k] + 2.0))
-            for i, other in enumerate(found):
-                cost += 20.0 * np.sum(_within(other[None], at, half[k] + half[i] + 2.0))
-            costs.append(cost)
+            crossed = [np.any(_within(other, at, half[k] + 2.0)) for other in others]
+            labels = [
+                np.all(np.abs(other - at) < half[k] + size + 2.0)
+                for other, size in zip(found, half, strict=False)
+            ]
+            hits = np.sum(_within(points, at, half[k] + clear)) + np.sum(labels)
+            costs.append(2.0 * abs(place - _MIDDLE) + 20.0 * hits + 5.0 * np.sum(crossed))
         found.append(spots[int(np.argmin(costs))])
     return found
 
 
 def _nearest(points: Array, curve: Array) -> Array:
     """Distance of each point from a curve."""
-    found: Array = np.linalg.norm(points[:, None] - curve, axis=2).min(axis=1)
-    return found
+    return np.linalg.norm(points[:, None] - curve, axis=2).min(axis=1)
 
 
 def _close(
@@ -108,7 +106,7 @@ def _close(
     points: Array,
     clear: float,
 ) -> float:
-    """Share of a curve that runs along another one, the surroundings of common ends left out."""
+    """Share of a curve that is close to another one, except near common ends."""
     apart = _nearest(curve, drawn[1]) < 0.5 * clear
     for i in set(pair) & set(drawn[0]):
         apart &= np.linalg.norm(curve - points[i], axis=1) > _SHARED * clear
@@ -116,5 +114,4 @@ def _close(
 
 
 def _within(points: Array, at: Array, half: Array) -> NDArray[np.bool_]:
-    found: NDArray[np.bool_] = np.all(np.abs(points - at) < half, axis=1)
-    return found
+    return np.all(np.abs(points - at) < half, axis=1)

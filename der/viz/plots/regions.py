@@ -5,22 +5,23 @@ Places are in unit coordinates, from 0 to 1 along both parameters of the picture
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from der.utils.checks import Array
+from der.viz.curve import arc_length
 
 Labels = NDArray[np.int64]
 
 NOT_FOLDABLE, STABLE, BACK, FAILED = 0, 2, 1, 5  # a foldable ring: 1 + STABLE + BACK, as they apply
-FINER = (4, 32)  # pixels between two nodes, at least and at most,
-PIXELS = 512  # and so many across
-BETWEEN = 6  # pieces of a line between two points of a boundary
-NEIGHBOURS = 64  # shown places that a hidden one is compared with
-UNSEEN = 10.0  # cells: places beyond a boundary count only where there are no others
+FINER = (4, 32)  # pixels between two nodes, at least and at most
+PIXELS = 512  # across all nodes
+BETWEEN = 6  # pieces of the line between two points of a boundary
+NEIGHBOURS = 64  # visible places with which a hidden one is compared
+UNSEEN = 10.0  # cells, added to distances across a boundary: such places are the last choice
 
 
 class Sheet(NamedTuple):
@@ -29,22 +30,22 @@ class Sheet(NamedTuple):
     axis: str  # "x" or "y"
     labels: Labels  # (n, n) at the nodes of a lattice: NOT_FOLDABLE, 1 to 4, or FAILED
     slopes: Array  # (n, n) dM/dgamma at pi, interpolated within cells
-    beside: Array  # (m, 2) places of cases that are no nodes
+    beside: Array  # (m, 2) places of cases that are not nodes
     beside_labels: Labels  # (m,)
 
 
 class Boundary(NamedTuple):
     """A boundary between folding modes."""
 
-    kind: str  # with " (scan)" after it where it is as the scan sees it
+    kind: str  # followed by " (scan)" where only the scan locates it
     axis: str
     places: Array  # (n, 2) in order
 
     @property
     def line(self) -> Array:
-        """The places with more between them, on Akima's curve, which does not swing at a kink.
+        """The places and more between them, on Akima's curve, which does not oscillate at a kink.
 
-        What was scanned is left as it is.
+        A scanned boundary has its own places only.
         """
         from scipy.interpolate import Akima1DInterpolator
 
@@ -52,8 +53,7 @@ class Boundary(NamedTuple):
         places = self.places[np.append(True, steps > 1e-9 * steps.max(initial=0.0))]
         if len(places) < 3 or self.kind.endswith(")"):
             return places
-        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-        along = np.append(0.0, np.cumsum(steps))
+        along = arc_length(places)
         n = np.arange(BETWEEN * (len(places) - 1) + 1) / BETWEEN
         at = np.interp(n, np.arange(len(along)), along)
         return np.asarray(Akima1DInterpolator(along, places)(at))
@@ -62,9 +62,9 @@ class Boundary(NamedTuple):
 def pixels(sheet: Sheet, boundaries: Iterable[Boundary]) -> Labels:
     """Labels (k, k) of pixels between the nodes of a sheet.
 
-    Where a boundary passes, the label is that of the nearest case on the same side. Elsewhere,
-    whether a ring is foldable and snaps back is what most of the neighbours do, weighted by
-    distance; whether it is stable is the sign of the slope at pi, interpolated.
+    Beside a boundary the label is that of the nearest case on the same side. Elsewhere, a ring is
+    foldable or snaps back if most of its neighbours do, weighted by distance. It is stable if the
+    interpolated slope at pi is positive.
     """
     labels = sheet.labels
     n = len(labels)
@@ -73,8 +73,7 @@ def pixels(sheet: Sheet, boundaries: Iterable[Boundary]) -> Labels:
     weight = np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(n)))
 
     def mean(values: Array | NDArray[np.bool_]) -> Array:
-        spread: Array = weight @ values.astype(float) @ weight.T
-        return spread
+        return weight @ values.astype(float) @ weight.T
 
     foldable = (labels > NOT_FOLDABLE) & (labels < FAILED)
     back = foldable & ((labels - 1) % 2 == BACK)
@@ -86,18 +85,13 @@ def pixels(sheet: Sheet, boundaries: Iterable[Boundary]) -> Labels:
     found[winner == 0] = NOT_FOLDABLE
     found[winner == 2] = FAILED
     lines = [b.line * (n - 1) for b in boundaries if b.axis == sheet.axis and len(b.places) > 1]
-    _correct(found, sheet, _segments(lines))
+    segments = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+    _correct(found, sheet, np.concatenate([np.empty((0, 2, 2)), *segments]))
     return found
 
 
-def _segments(lines: Sequence[Array]) -> Array:
-    """The pieces (m, 2, 2) of lines."""
-    pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
-    return np.concatenate([np.empty((0, 2, 2)), *pieces])
-
-
 def _correct(found: Labels, sheet: Sheet, segments: Array) -> None:
-    """Where labels differ within a cell, give each pixel the label of its side of a boundary.
+    """In cells with different labels, give each pixel the label of its side of a boundary.
 
     Parameters
     ----------
@@ -133,9 +127,9 @@ def _correct(found: Labels, sheet: Sheet, segments: Array) -> None:
 def _on_sides(
     places: Array, labels: Labels, cases: Array, names: Labels, segments: Array
 ) -> Labels:
-    """Labels of places (k, 2): that of the nearest case which no segment hides.
+    """Labels of places (k, 2): that of the nearest case that no segment hides.
 
-    Where segments hide all cases, the label is that of the nearest place which is not hidden.
+    Where segments hide all cases, the label is that of the nearest place that is not hidden.
     """
     from scipy.spatial import KDTree
 
@@ -159,12 +153,10 @@ def _crossed(places: Array, nodes: Array, segments: Array) -> NDArray[np.bool_]:
     a, b = segments[:, 0], segments[:, 1]
     sides = _area(p, q, a) * _area(p, q, b) < 0.0
     ends = _area(a, b, p) * _area(a, b, q) < 0.0
-    crossed: NDArray[np.bool_] = np.any(sides & ends, axis=2)
-    return crossed
+    return np.any(sides & ends, axis=2)
 
 
 def _area(a: Array, b: Array, c: Array) -> Array:
-    """Twice the area of a triangle, positive where it is traversed to the left."""
+    """Twice the area of a triangle, positive for counterclockwise corners."""
     u, v = b - a, c - a
-    area: Array = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-    return area
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]

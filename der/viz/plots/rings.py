@@ -49,8 +49,7 @@ def strands_apart(x: Array, share: float) -> Array:
     """Vertices of a ring with coincident strands, moved apart by a share of its size."""
     middle = x.mean(axis=0)
     turn = 2.0 * math.pi * np.arange(len(x))[:, None] / len(x)
-    moved: Array = middle + (x - middle) * (1.0 + share * np.cos(turn))
-    return moved
+    return middle + (x - middle) * (1.0 + share * np.cos(turn))
 
 
 class View(NamedTuple):
@@ -83,8 +82,7 @@ def seen(x: Array, level: Array | None = None) -> View:
 def box_middle(points: Array) -> Array:
     """Middle (2,) of the box around points (..., 2)."""
     flat = points.reshape(-1, 2)
-    middle: Array = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
-    return middle
+    return (flat.min(axis=0) + flat.max(axis=0)) / 2.0
 
 
 def place_ribbon(

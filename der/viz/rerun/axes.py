@@ -1,4 +1,4 @@
-"""Axes of a recording: where curves over gamma, ticks and labels lie in a plane."""
+"""Axes of a recording: the places of curves over gamma, ticks and labels in a plane."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
 from der.utils.checks import Array
+from der.viz.curve import arc_length
 from der.viz.rerun.entities import CHALK, QUIET, Colour, Entities
 
 WIDE, HIGH = 150.0, 90.0  # in its own units
@@ -17,12 +18,12 @@ DASH = 1.3  # of a dotted line, and the gap between two, in the same
 
 
 class PlotAxes:
-    """Where (gamma, value) is drawn: in a box WIDE by HIGH, of which y points down.
+    """Map (gamma, value) to the picture: to a box WIDE by HIGH, whose y points down.
 
     Parameters
     ----------
-    gamma, values : arrays that the axes are to hold, 0 with them.
-    window : instead, the least and largest gamma and value of a part that is shown larger.
+    gamma, values : arrays that the axes contain, together with 0.
+    window : instead, the least and largest gamma and value of an enlarged part.
     """
 
     def __init__(
@@ -42,19 +43,19 @@ class PlotAxes:
 
     def place(self, gamma: ArrayLike, values: ArrayLike) -> Array:
         """Points (n, 2) of the axes."""
-        across = (np.asarray(gamma, dtype=float) - self.gamma[0]) / (self.gamma[1] - self.gamma[0])
-        up = (np.asarray(values, dtype=float) - self.values[0]) / (self.values[1] - self.values[0])
-        return np.stack(np.broadcast_arrays(WIDE * across, -HIGH * up), axis=-1)
+        points = np.stack(np.broadcast_arrays(gamma, values), axis=-1).astype(float)
+        (left, right), (low, high) = self.gamma, self.values
+        return (points - (left, low)) / (right - left, low - high) * (WIDE, HIGH)
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Whether points (n, 2) lie within a window; all do where there is none."""
+        """Whether points (n, 2) lie within the window; all do where there is none."""
         if self.window is None:
             return np.ones(len(points), dtype=bool)
         x, y = points[:, 0], -points[:, 1]
         return (x >= 0.0) & (x <= WIDE) & (y >= 0.0) & (y <= HIGH)
 
     def inside(self, line: Array) -> list[Array]:
-        """The pieces of a line (n, 2) that lie within a window; all of it where there is none."""
+        """The pieces of a line (n, 2) within the window; the complete line where there is none."""
         shown = self.holds(line)
         if shown.all():
             return [line]
@@ -85,7 +86,7 @@ def _rounds(low: float, high: float) -> Array:
 
 def dotted(line: Array) -> list[Array]:
     """The dashes (2, 2) of a line (n, 2), alike along it."""
-    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
+    along = arc_length(line)
     length = float(along[-1]) or DASH
     starts = np.arange(0.0, length, 2.0 * DASH)
     ends = np.minimum(starts + DASH, length)
@@ -94,7 +95,7 @@ def dotted(line: Array) -> list[Array]:
 
 
 def send_axes(sent: Entities, entity: str, axes: PlotAxes) -> None:
-    """The axes of a axes with their ticks."""
+    """Send the lines, ticks and numbers of axes."""
     foot = axes.values[0]
     across = axes.place(axes.gamma, foot)
     upright = axes.place(axes.gamma[0], axes.values)

@@ -139,8 +139,7 @@ def send_surface(sent: Entities, surface: Surface) -> None:
 def grip_distance(motion: Motion) -> Array:
     """Distance (n,) between the grips along the twisting axis, a; negative after they passed."""
     middle = middles(motion.x)[..., 2]
-    distance: Array = middle[:, middle.shape[1] // 2] - middle[:, 0]
-    return distance
+    return middle[:, middle.shape[1] // 2] - middle[:, 0]
 
 
 def _send_relief(sent: Entities, surface: Surface, box: Box) -> None:
