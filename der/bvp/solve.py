@@ -26,10 +26,7 @@ ACROSS = 0.4  # of the tolerance: errors across the path, which at equal gamma s
 
 
 def solve_bvp(
-    scene: Scene,
-    *,
-    tolerance: float = TOLERANCE,
-    progress: Callable[[float], object] | None = None,
+    scene: Scene, *, tolerance: float = TOLERANCE, progress: Callable[[float], object] | None = None
 ) -> Path:
     """The path of equilibria of a ring by its boundary-value problem (paper, Eq. A.15).
 
@@ -60,10 +57,7 @@ def solve_bvp(
 
 
 def solve_with_points(
-    scene: Scene,
-    *,
-    tolerance: float = TOLERANCE,
-    progress: Callable[[float], object] | None = None,
+    scene: Scene, *, tolerance: float = TOLERANCE, progress: Callable[[float], object] | None = None
 ) -> tuple[Path, list[Point]]:
     """`solve_bvp`, and the points with their solutions."""
     check(scene, tolerance)
@@ -102,11 +96,7 @@ def check(scene: object, tolerance: object) -> None:
         raise ValueError(f"scene must be a der.Scene, got {scene!r}")
     allowed = f"a number from {FINEST:g} to {COARSEST:g} for a boundary-value problem"
     checked_number("tolerance", tolerance, allowed, lambda t: FINEST <= t <= COARSEST)
-    for name, only in (
-        ("stretch", "inextensible"),
-        ("control", "arclength"),
-        ("solver", "newton"),
-    ):
+    for name, only in (("stretch", "inextensible"), ("control", "arclength"), ("solver", "newton")):
         if getattr(scene, name) != only:
             raise ValueError(
                 f"{name} must be {only!r} for a boundary-value problem, "

@@ -164,11 +164,7 @@ class Row:
             If an entry is missing or not known.
         """
         try:
-            known = {
-                **entries,
-                "case": Case(**entries["case"]),
-                "folds": tuple(entries["folds"]),
-            }
+            known = {**entries, "case": Case(**entries["case"]), "folds": tuple(entries["folds"])}
             return cls(**known)
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a row: {problem}") from problem

@@ -28,10 +28,7 @@ class Jobs(Generic[T, R]):
     """
 
     def __init__(
-        self,
-        crew: Workers,
-        work: Callable[[tuple[T, ...]], R],
-        batches: Sequence[tuple[T, ...]],
+        self, crew: Workers, work: Callable[[tuple[T, ...]], R], batches: Sequence[tuple[T, ...]]
     ) -> None:
         self._crew = crew
         self._work = work

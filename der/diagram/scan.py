@@ -65,12 +65,7 @@ class Scan:
 
 
 def scan(
-    family: Family,
-    store: Store,
-    crew: Workers,
-    *,
-    solve: Solve = solve_case,
-    progress: bool = True,
+    family: Family, store: Store, crew: Workers, *, solve: Solve = solve_case, progress: bool = True
 ) -> Scan:
     """Scan a family; cases that the store has are not solved again.
 
@@ -144,11 +139,7 @@ def _children(cell: Cell) -> list[Cell]:
 
 
 def _to_split(
-    family: Family,
-    leaves: set[Cell],
-    new: list[Cell],
-    nodes: list[Node],
-    rows: Mapping[Node, Row],
+    family: Family, leaves: set[Cell], new: list[Cell], nodes: list[Node], rows: Mapping[Node, Row]
 ) -> set[Cell]:
     """Cells to refine: new ones that are mixed, and those with another label on their edges.
 

@@ -165,9 +165,7 @@ def _faces(cell: Cell) -> tuple[Square, Square]:
 
 
 def _lines(
-    squares: Sequence[Square],
-    rows: Mapping[Node, Row],
-    mode: Callable[[Row], bool | None],
+    squares: Sequence[Square], rows: Mapping[Node, Row], mode: Callable[[Row], bool | None]
 ) -> list[list[Pair]]:
     """Lines through squares, from one pair of neighbours that differ to the next."""
     beside: dict[Pair, list[Pair]] = {}

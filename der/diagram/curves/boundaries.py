@@ -33,14 +33,7 @@ from der.diagram.curves.corners import FOLD, Line, Met, mark_corners
 from der.diagram.curves.infinite_slope import across, infinite_slope_near, is_half
 from der.diagram.curves.label_changes import Crossing, crossings_of, differences, seeds
 from der.diagram.curves.polylines import distance, loose_ends, meetings
-from der.diagram.curves.pruning import (
-    BESIDE,
-    SAME_CURVE,
-    asked_beside,
-    beside,
-    pieces_of,
-    unlike,
-)
+from der.diagram.curves.pruning import BESIDE, SAME_CURVE, asked_beside, beside, pieces_of, unlike
 from der.diagram.curves.slices import Boundaries, Slice, SliceCases, Solve, joined, slices
 from der.diagram.curves.tracing import At, Function, States, corrected, trace
 from der.diagram.families import Family

@@ -50,10 +50,7 @@ def beside(line: Line, k: int, lines: Iterable[Line]) -> list[Array]:
     places = line.places
     way = places[min(k + 1, len(places) - 1)] - places[max(k - 1, 0)]
     normal = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-300)
-    free = min(
-        (_away(line, k, other) for other in lines if other is not line),
-        default=math.inf,
-    )
+    free = min((_away(line, k, other) for other in lines if other is not line), default=math.inf)
     free = min(free, *(_own(places, k, sign * BESIDE * normal) for sign in (1.0, -1.0)))
     reach = min(BESIDE, 0.3 * free)
     if reach < (CLOSEST_CUSP if line.kind == CUSP else CLOSEST):
