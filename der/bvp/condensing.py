@@ -156,20 +156,10 @@ def moment_at(m0, force, at, out):
 def _right_hand_sides(piece, rest, m0, force, frames, inner, moment, turn):
     """Fill ``inner``, except for positions and directors, which are known."""
     for j in range(frames.shape[0]):
-        at, fm = inner.at[j], inner.fm[j]
+        at, d, f = inner.at[j], inner.d[j], inner.f[j]
+        fq, fm, gq = inner.fq[j], inner.fm[j], inner.gq[j]
         moment_at(m0, force, at, moment)
-        stage(
-            frames[j],
-            moment,
-            rest[j],
-            piece.stiffness,
-            inner.d[j],
-            turn,
-            inner.f[j],
-            inner.fq[j],
-            fm,
-            inner.gq[j],
-        )
+        stage(frames[j], moment, rest[j], piece.stiffness, d, turn, f, fq, fm, gq)
         for a in range(4):
             row = 4 * j + a
             f1, f2, f3 = fm[a, 0], fm[a, 1], fm[a, 2]

@@ -203,17 +203,11 @@ def row_of(case: Case, path: Path) -> Row:
     label = label_of(mode.foldable, mode.stable, mode.snapping)
     if label == FAILED:
         return failed(case, "a foldable ring without a limit of M")
-    return Row(
-        case,
-        label,
-        mode.foldable,
-        bool(mode.stable),
-        mode.snapping,
-        None if at_pi is None else at_pi.moment,  # a path that turns back never arrives
-        None if at_pi is None else at_pi.slope,
-        tuple(point.gamma for point in path.folds),
-        _error(path),
-    )
+    # a path that turns back never arrives at pi
+    moment, slope = (None, None) if at_pi is None else (at_pi.moment, at_pi.slope)
+    how = (mode.foldable, bool(mode.stable), mode.snapping)
+    folds = tuple(point.gamma for point in path.folds)
+    return Row(case, label, *how, moment, slope, folds, _error(path))
 
 
 def label_of(foldable: bool, stable: bool | None, snapping: str) -> str:

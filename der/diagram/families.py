@@ -23,9 +23,8 @@ class Family:
     name : as on the command line
     title : with mathtext
     shape : of all its cases
-    parameters : what varies, in the order of the unit coordinates; r_over_a comes after what
-        bounds it
-    ranges : first and last value of each
+    ranges : first and last value of what varies, by name, in the order of the unit coordinates;
+        r_over_a comes after what bounds it, and h_over_t is the last
     fixed : parameters that do not vary, by name
     sheets : twisting axes; each has a unit square (cube) of its own
     stadium : whether r_over_a is b_over_a
@@ -37,8 +36,7 @@ class Family:
     name: str
     title: str
     shape: str
-    parameters: tuple[str, ...]
-    ranges: tuple[tuple[float, float], ...]
+    ranges: Mapping[str, tuple[float, float]]
     fixed: tuple[tuple[str, float], ...] = ()
     sheets: tuple[str, ...] = ("x",)
     stadium: bool = False
@@ -49,9 +47,14 @@ class Family:
     finest: int = 64
 
     @property
+    def parameters(self) -> tuple[str, ...]:
+        """What varies, in the order of the unit coordinates."""
+        return tuple(self.ranges)
+
+    @property
     def dimension(self) -> int:
         """Of the diagram: 2 or 3."""
-        return len(self.parameters)
+        return len(self.ranges)
 
     @property
     def span(self) -> tuple[float, float]:
@@ -64,7 +67,7 @@ class Family:
         The fillets are at most b (rectangle) or the inscribed circle (triangle): the diagram is a
         prism, and the unit coordinate reaches from its one side to the other.
         """
-        low, high = self.ranges[self.parameters.index(name)]
+        low, high = self.ranges[name]
         if name == "r_over_a":
             high = min(high, widest_fillet(self.shape, values))
         return low, high
@@ -142,7 +145,7 @@ def family(
         if isinstance(finest, bool) or finest not in powers:
             raise ValueError(f"finest must be a power of two from 2 to 1024, got {finest!r}")
         found = replace(found, finest=finest, coarse=min(found.coarse, finest))
-    new = dict(zip(found.parameters, found.ranges, strict=True))
+    new = dict(found.ranges)
     for parameter, given in (ranges or {}).items():
         if parameter not in new:
             words = ", ".join(found.parameters)
@@ -150,7 +153,7 @@ def family(
         new[parameter] = _checked_range(parameter, given)
     found = replace(
         found,
-        ranges=tuple(new.values()),
+        ranges=new,
         nu=nu,
         marks=tuple(replace(m, nu=nu) for m in found.marks),
     )
@@ -216,8 +219,7 @@ _FAMILIES = (
         "fig3a",
         "Elliptical rings",
         "ellipse",
-        ("b_over_a", "h_over_t"),
-        ((0.5, 1.0), (0.2, 4.0)),
+        {"b_over_a": (0.5, 1.0), "h_over_t": (0.2, 4.0)},
         sheets=("x", "y"),
         marks=_ELLIPSES,
     ),
@@ -225,8 +227,7 @@ _FAMILIES = (
         "fig5a",
         "Rounded rectangular rings",
         "rectangle",
-        ("b_over_a", "r_over_a", "h_over_t"),
-        ((0.2, 1.0), (0.1, 1.0), H_OVER_T),
+        {"b_over_a": (0.2, 1.0), "r_over_a": (0.1, 1.0), "h_over_t": H_OVER_T},
         sheets=("x", "y"),
         marks=(*_RECTANGLES, *_SQUARES),
         coarse=8,
@@ -236,8 +237,7 @@ _FAMILIES = (
         "fig5b",
         "Stadium rings, $r = b$",
         "rectangle",
-        ("b_over_a", "h_over_t"),
-        ((0.2, 1.0), H_OVER_T),
+        {"b_over_a": (0.2, 1.0), "h_over_t": H_OVER_T},
         sheets=("x", "y"),
         stadium=True,
         marks=_SQUARES[-1:],
@@ -246,8 +246,7 @@ _FAMILIES = (
         "fig5c",
         "Rounded square rings, $a = b$",
         "rectangle",
-        ("r_over_a", "h_over_t"),
-        ((0.1, 1.0), H_OVER_T),
+        {"r_over_a": (0.1, 1.0), "h_over_t": H_OVER_T},
         fixed=(("b_over_a", 1.0),),
         marks=_SQUARES,
     ),
@@ -255,8 +254,7 @@ _FAMILIES = (
         "fig8a",
         "Rounded triangular rings",
         "triangle",
-        ("vertex_angle", "r_over_a", "h_over_t"),
-        ((30.0, 120.0), (0.033, 0.384), H_OVER_T),
+        {"vertex_angle": (30.0, 120.0), "r_over_a": (0.033, 0.384), "h_over_t": H_OVER_T},
         marks=(*_EQUILATERAL, *_OBTUSE, _SHARP),
         coarse=8,
         finest=32,
@@ -265,8 +263,7 @@ _FAMILIES = (
         "fig8b",
         "Rounded equilateral triangular rings, $\\alpha_T$ = 60°",
         "triangle",
-        ("r_over_a", "h_over_t"),
-        ((0.033, 0.384), H_OVER_T),
+        {"r_over_a": (0.033, 0.384), "h_over_t": H_OVER_T},
         fixed=(("vertex_angle", 60.0),),
         marks=_EQUILATERAL,
     ),
@@ -274,8 +271,7 @@ _FAMILIES = (
         "fig8c",
         "Rounded triangular rings, $\\alpha_T$ = 120°",
         "triangle",
-        ("r_over_a", "h_over_t"),
-        ((0.033, 0.384), H_OVER_T),
+        {"r_over_a": (0.033, 0.384), "h_over_t": H_OVER_T},
         fixed=(("vertex_angle", 120.0),),
         marks=_OBTUSE,
     ),
@@ -283,8 +279,7 @@ _FAMILIES = (
         "circle",
         "Circular rings with natural curvature",
         "circle",
-        ("natural_curvature", "h_over_t"),
-        ((0.0, 2.0), H_OVER_T),
+        {"natural_curvature": (0.0, 2.0), "h_over_t": H_OVER_T},
         marks=tuple(Case("circle", h, natural_curvature=1.0) for h in (1.0, 1.6, 2.0, 4.0)),
     ),
 )

@@ -29,7 +29,7 @@ def picture(scan: Scan, curves: Sequence[Curve], beside: Sequence[Row] = ()) -> 
     return DiagramPicture(
         f"{family.title}, ν = {family.nu:g}",
         (family.parameters[0], family.parameters[-1]),
-        (family.span, family.ranges[-1]),
+        (family.span, family.ranges["h_over_t"]),
         tuple(_slice(scan, k, curves, beside) for k in cuts),
     )
 
@@ -74,11 +74,12 @@ def _shape(case: Case) -> str:
 
 def _name(family: Family, k: int) -> str:
     """Which fillets a slice shows: from the sharpest, the same for all rings, to the widest."""
-    low, high = family.ranges[1]
+    low, high = family.ranges["r_over_a"]
     widest = "b" if family.shape == "rectangle" else "R_C"
     if k == 0:
         return f"$r/a$ = {low:g}"
-    if high < max(widest_fillet(family.shape, {family.parameters[0]: v}) for v in family.ranges[0]):
+    first = family.parameters[0]
+    if high < max(widest_fillet(family.shape, {first: value}) for value in family.ranges[first]):
         widest = f"\\min({widest}, {high:g}a)"
     if k == family.finest:
         return f"$r = {widest}$"

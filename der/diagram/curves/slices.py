@@ -83,7 +83,7 @@ class SliceCases:
     def __init__(self, part: Slice, solve: Solve) -> None:
         self.family, self.sheet, self.plane, self.placed = part
         self.solve = solve
-        low, high = self.family.ranges[-1]
+        low, high = self.family.ranges["h_over_t"]
         self.height = high - low  # of h/t
 
     def case(self, u: Array | tuple[float, float]) -> Case:
