@@ -17,7 +17,7 @@ FOLDED_TURN = 6 * np.pi  # of the three-covered ring
 FIRST_STEP, SMALLEST_STEP = 0.2, 0.01
 CONVERGED, BETWEEN = 1e-12, 1e-3  # rad, Newton's last change of angle
 LARGEST_CHANGE = 3.0  # rad, of a Newton step that is still believed
-INEXACT = 1e-5  # relative, of a Newton step: what is left of the error, for the next one
+INEXACT = 1e-5  # relative error of a Newton step, left for the next one
 SWEEPS, ITERATIONS = 100, 8
 
 

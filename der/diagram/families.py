@@ -161,7 +161,7 @@ def family(
         if "r_over_a" in found.parameters and _empty(found, corner):
             low = new["r_over_a"][0]
             raise ValueError(f"r_over_a must begin below the widest fillet of all rings, got {low}")
-        found.case(found.sheets[-1], corner).scene()  # what is not allowed is refused by name
+        found.case(found.sheets[-1], corner).scene()  # refuses a value that is not allowed, by name
     return found
 
 

@@ -12,7 +12,7 @@ from der.diagram.workers import Workers, died
 T = TypeVar("T")
 R = TypeVar("R")
 
-AHEAD = 2  # tasks a worker that wait or run, so that none is idle
+AHEAD = 2  # tasks that wait or run, for each worker: so all are busy
 DEATHS = 2  # of workers, each by the same single thing: it is given up
 MOST_DEATHS = 8  # of workers in a row without a result between: they cannot work here
 

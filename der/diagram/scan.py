@@ -229,7 +229,7 @@ def _solve_batch(solve: Solve, batch: Batch) -> list[Row]:
 
 @contextmanager
 def _progress(family: Family, *, shown: bool) -> Iterator[Level]:
-    """A progress bar with the time left, on a terminal; it is told every level of a scan."""
+    """A progress bar with the time left, on a terminal; it yields what starts a level."""
     if not (shown and sys.stderr.isatty()):
         yield lambda edge, nodes, todo: None
         return

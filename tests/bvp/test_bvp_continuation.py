@@ -67,7 +67,7 @@ def test_neighbouring_states_are_in_path_order():
 
 
 def test_tangent_at_a_fold_has_no_part_in_gamma():
-    """dgamma = 0 where a fold is said to be; 1e-7 is the increment that ends Newton's method."""
+    """dgamma = 0 at every fold; 1e-7 is the increment that ends Newton's method."""
     for point in points(system(der.circle(), 1.6), math.pi):
         if point.kind == "fold":
             assert abs(point.solution.tangent.gamma) < 1e-7
@@ -102,7 +102,7 @@ def test_errors_stay_below_the_tolerance(tolerance):
 def test_errors_are_relative_to_what_is_handed_out():
     """A triangle with sharp corners, of a tall section.
 
-    A solution on too coarse a mesh, not handed out, has three times the moment of all that are.
+    A solution on too coarse a mesh is not handed out; its moment is three times that of the others.
     """
     ring = der.triangle(math.pi / 2, 0.005)
     path = points(system(ring, 38.331698305621025, 0.0), math.pi, 4.5e-7)

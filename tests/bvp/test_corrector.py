@@ -156,7 +156,7 @@ def test_too_few_iterations_are_slow(start):
     assert found.reason is Reason.TOO_MANY_ITERATIONS
 
 
-def test_a_guess_from_nowhere_diverges(start):
+def test_a_guess_without_a_tangent_diverges(start):
     """A moment a thousand times too large sends the first increment beyond any rotation."""
     equations, at = start
     guess = Direction(at.frames, 1e3 + at.p, at.gamma)
@@ -168,8 +168,8 @@ def test_a_guess_from_nowhere_diverges(start):
 def test_a_step_without_direction_is_singular(start):
     """The row of the tangent is zero: the bordered system has no inverse."""
     equations, at = start
-    nowhere = Direction(np.zeros_like(at.frames), np.zeros_like(at.p), 0.0)
-    found = equations.solved(at.mesh, guess_at(at, at.gamma), nowhere)
+    none = Direction(np.zeros_like(at.frames), np.zeros_like(at.p), 0.0)
+    found = equations.solved(at.mesh, guess_at(at, at.gamma), none)
     assert isinstance(found, Failure)
     assert found.reason is Reason.SINGULAR
 

@@ -119,7 +119,7 @@ def test_path_ends_at_gamma_max(gamma_max):
     assert (record.mode is None) == (gamma_max < math.pi)
 
 
-def test_unfoldable_ring_is_followed_until_it_is_folded():
+def test_ring_that_is_not_foldable_is_followed_until_it_is_folded():
     """The path of the circle at h/t = 1 ends at its third arrival at pi.
 
     Beyond pi to gamma = 5.459, back to 3.062, and to the three-covered state at the
@@ -301,7 +301,7 @@ def test_interrupting_keeps_the_path(states):
 
 
 def test_ctrl_c_while_the_record_is_made_keeps_the_path(monkeypatch):
-    """Pressed while the shapes are sampled, all states found: interrupted, and whole."""
+    """Pressed while the shapes are sampled, all states found: interrupted, and complete."""
     sampled = Followed._shapes
 
     def press_and_sample(*arguments):
@@ -315,7 +315,7 @@ def test_ctrl_c_while_the_record_is_made_keeps_the_path(monkeypatch):
     assert (path.status, path.gamma[-1], len(path.shapes.x)) == ("interrupted", math.pi, len(path))
 
 
-def test_a_path_that_never_arrives_is_unfoldable_and_says_so():
+def test_a_path_that_never_arrives_is_not_foldable_and_says_so():
     """A ring whose path turns back before pi: done, with a mode, a sentence, and nothing at pi."""
     ring = der.rectangle(0.46090256772792904, 0.3814496387454095, "y")
     path = solve_bvp(der.Scene(ring, der.rectangular_section(3.3692299828162224, 0.0)))

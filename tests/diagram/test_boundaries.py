@@ -125,7 +125,7 @@ def test_curves_meet_in_their_corners(about_y):
 
 
 def test_ends_of_curves_are_corners_or_on_the_edge(about_y):
-    """No curve ends in the middle of nowhere, and the edge is met exactly."""
+    """No curve has a loose end, and the edge is met exactly."""
     corners = {(c.point.case.b_over_a, c.point.case.h_over_t) for c in about_y.corners}
     for curve in about_y.curves:
         for point in (curve.points[0], curve.points[-1]):
@@ -134,7 +134,7 @@ def test_ends_of_curves_are_corners_or_on_the_edge(about_y):
 
 
 def test_a_missing_curve_is_noticed(about_y):
-    """Without the fold at pi the exchange leads nowhere at one end; with all curves none does."""
+    """Without the fold at pi the exchange has one loose end; with all curves there is none."""
     of = about_y.scan.family
     assert loose_ends(of, about_y.curves, about_y.corners) == []
     rest = [curve for curve in about_y.curves if curve.kind != "foldability"]

@@ -155,12 +155,12 @@ def test_torn_last_line_is_cut_off(tmp_path):
     """What is left of it would else spoil the next line, too."""
     file = tmp_path / "cases.jsonl"
     scanned(TOY, file, Here())
-    whole = file.read_bytes()
-    file.write_bytes(whole[:-40])
+    complete = file.read_bytes()
+    file.write_bytes(complete[:-40])
     again = scanned(TOY, file, Here())
     assert again.solved == 1
     assert [json.loads(line)["key"] for line in file.read_bytes().splitlines()] == [
-        json.loads(line)["key"] for line in whole.splitlines()
+        json.loads(line)["key"] for line in complete.splitlines()
     ]
 
 
@@ -319,7 +319,7 @@ def test_killed_twice_and_resumed_is_as_if_nothing_had_been(tmp_path, told, undi
 
 
 def test_workers_leave_when_their_parent_is_killed(tmp_path, told):
-    """They would wait for ever for tasks that nobody sends."""
+    """They would wait for ever for tasks that no process sends."""
     process = run(tmp_path)
     wait_for(tmp_path / "cases.jsonl", 20, process)
     assert kill(process, workers_too=False)

@@ -102,7 +102,7 @@ def test_sites_are_mirror_symmetric(shape):
 
 @EVERY_RING
 def test_sectors_are_pieces_of_the_ring(shape):
-    """A half holds the first sites of the whole, a quarter the last of the half, bit for bit."""
+    """A half has the first sites of the full ring, a quarter the last of the half, bit for bit."""
     ring = RINGS[shape]
     half = sites(ring, 64, "half")
     assert_array_equal(sites(ring, 64, "full")[:33], half)

@@ -221,7 +221,7 @@ class _Search:
         return BoundaryPoint(self.cases.case(at.u), state.gamma, state.moment, error)
 
     def _error(self, kind: str, at: At[Value]) -> float:
-        """Error of the place in h/t: what is left of the condition, and what halving changes."""
+        """Error of the place in h/t: residual of the condition, and its change on a halved mesh."""
         state = at.state
         try:
             fine = on(state.at.mesh.halved, state)

@@ -54,7 +54,7 @@ class Value(NamedTuple):
     psi: Array | None = None  # of an exchange, see `branch_exchange`: its state has no tangent
     bend: Array | None = None  # likewise
     way: Array | None = None  # of an infinite slope, see `infinite_slope`: direction across it
-    place: Array | None = None  # likewise: on the boundary, of which the state is
+    place: Array | None = None  # of an infinite slope: the place of the state, on the boundary
 
 
 Condition = Callable[[Scene, Value], Value]

@@ -50,7 +50,7 @@ class Crossing(NamedTuple):
         return float(np.linalg.norm(u - a - along * (b - a)))
 
     def halved(self, place: tuple[float, float], row: Row) -> Crossing | None:
-        """The half in which the two cases differ likewise; None where there is none."""
+        """The half in which the two cases differ in the same way; None where there is none."""
         halves = (self._replace(b=place, second=row), self._replace(a=place, first=row))
         return next((h for h in halves if self.kind in differences(h.first, h.second)), None)
 
