@@ -12,17 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from der import (
-    Ring,
-    Scene,
-    Section,
-    circle,
-    ellipse,
-    profile,
-    rectangle,
-    rectangular_section,
-    section,
-)
+import der
 from der.geometry.shapes import ring_from_json, triangle_in_degrees
 from der.scene import MEASURES
 from der.utils.checks import Array
@@ -84,27 +74,27 @@ def cases(count: int, seed: int, *, most_edges: int = 2048) -> Iterator[Case]:
 # --- From parameters to the statement --------------------------------------------------------
 
 
-def scene_of(parameters: Mapping[str, Any], **more: Any) -> Scene:
+def scene_of(parameters: Mapping[str, Any], **more: Any) -> der.Scene:
     """The scene of a case, with further entries."""
     wants = dict(parameters["wants"]) | more
-    return Scene(ring_of(parameters["ring"]), section_of(parameters), **wants)
+    return der.Scene(ring_of(parameters["ring"]), section_of(parameters), **wants)
 
 
-def section_of(parameters: Mapping[str, Any]) -> Section:
+def section_of(parameters: Mapping[str, Any]) -> der.Section:
     """The section of a case."""
     if "alpha" in parameters:
-        return section(parameters["alpha"], parameters["beta"])
-    return rectangular_section(parameters["h_over_t"], parameters["nu"])
+        return der.section(parameters["alpha"], parameters["beta"])
+    return der.rectangular_section(parameters["h_over_t"], parameters["nu"])
 
 
-def ring_of(entries: Mapping[str, Any]) -> Ring:
+def ring_of(entries: Mapping[str, Any]) -> der.Ring:
     """The ring of a case: as in a record, or through noisy points along one of these."""
     if "points" not in entries:
         return ring_from_json(entries)
-    return profile(points=noisy_points(ring_of(entries["of"]), **entries["points"]))
+    return der.profile(points=noisy_points(ring_of(entries["of"]), **entries["points"]))
 
 
-def noisy_points(ring: Ring, count: int, noise: float, seed: int, *, symmetric: bool) -> Array:
+def noisy_points(ring: der.Ring, count: int, noise: float, seed: int, *, symmetric: bool) -> Array:
     """Points (n, 2) along a ring, each moved at random, by ``noise`` at one standard deviation.
 
     Parameters
@@ -142,13 +132,13 @@ def _ring(random: np.random.Generator, *, shapes: tuple[str, ...] = ()) -> Param
     shape = str(random.choice(shapes or ("circle", "ellipse", "rectangle", "triangle")))
     axis = str(random.choice(["x", "y"]))
     if shape == "circle":
-        return circle().to_json()
+        return der.circle().to_json()
     if shape == "ellipse":
-        return ellipse(float(random.choice([random.uniform(0.1, 1.0), 1.0])), axis).to_json()
+        return der.ellipse(float(random.choice([random.uniform(0.1, 1.0), 1.0])), axis).to_json()
     if shape == "rectangle":
         b = float(random.choice([_log(random, 0.05, 1.0), 1.0]))
         r = float(random.choice([0.005, b, _log(random, 0.005, b)]))
-        return rectangle(b, r, axis).to_json()
+        return der.rectangle(b, r, axis).to_json()
     apex = float(random.choice([60.0, 90.0, random.uniform(10.0, 160.0)]))
     inscribed = 0.5 * math.tan(math.pi / 4 - math.radians(apex) / 4)
     r = float(random.choice([0.005, inscribed, _log(random, 0.005, inscribed)]))
@@ -216,13 +206,13 @@ def _close_folds(random: np.random.Generator, most: int) -> Parameters:
     wants = {"n_edges": min(n_edges, most), "sector": str(random.choice(["auto", "full"]))}
     # on N edges they are born elsewhere, by about 5.5/N^2 of h/t
     h_over_t = BIRTH_OF_FOLDS + float(random.choice([0.0, random.uniform(-1.0, 1.0) * 1e-2])) + away
-    return {"ring": circle().to_json(), "h_over_t": h_over_t, "nu": 0.3, "wants": wants}
+    return {"ring": der.circle().to_json(), "h_over_t": h_over_t, "nu": 0.3, "wants": wants}
 
 
 def _natural_curvature(random: np.random.Generator, most: int) -> Parameters:
     found = _path(random, min(most, 128))
     natural = float(random.choice([-2.0, -1.0, 0.0, 3.0, 4.0, random.uniform(-2.0, 4.0)]))
-    found["ring"] = circle(natural).to_json()
+    found["ring"] = der.circle(natural).to_json()
     return found
 
 
@@ -270,12 +260,12 @@ def _compare(random: np.random.Generator, most: int) -> Parameters:
     """Rings that both solvers resolve well: the rod's error bars must hold the other's values."""
     shape = str(random.choice(["circle", "ellipse", "rectangle"]))
     axis = str(random.choice(["x", "y"]))
-    ring = circle()
+    ring = der.circle()
     if shape == "ellipse":
-        ring = ellipse(float(random.uniform(0.5, 1.0)), axis)
+        ring = der.ellipse(float(random.uniform(0.5, 1.0)), axis)
     elif shape == "rectangle":
         b = float(random.uniform(0.3, 1.0))
-        ring = rectangle(b, float(random.uniform(0.2 * b, b)), axis)
+        ring = der.rectangle(b, float(random.uniform(0.2 * b, b)), axis)
     return {
         "ring": ring.to_json(),
         "h_over_t": _log(random, 1.0, 10.0),
@@ -312,7 +302,11 @@ def _points(random: np.random.Generator, most: int) -> Parameters:
 def _extreme(random: np.random.Generator, most: int) -> Parameters:
     """One number at a time that is extreme, but allowed."""
     wants: Parameters = {"n_edges": int(random.choice([8, 16, 32]))}
-    found: Parameters = {"ring": circle().to_json(), "h_over_t": _log(random, 0.5, 6.0), "nu": 0.3}
+    found: Parameters = {
+        "ring": der.circle().to_json(),
+        "h_over_t": _log(random, 0.5, 6.0),
+        "nu": 0.3,
+    }
     which = str(random.choice(["gamma_max", "save_at", "section", "a_over_t", "ring", "natural"]))
     if which == "gamma_max":
         wants["gamma_max"] = 10.0 ** random.uniform(-323.0, 6.0)
@@ -326,12 +320,14 @@ def _extreme(random: np.random.Generator, most: int) -> Parameters:
     elif which == "ring":
         b = _log(random, 1e-3, 0.1)
         axis = str(random.choice(["x", "y"]))
-        thin = (ellipse(b, axis), rectangle(b, _log(random, 1e-4, b), axis))
+        thin = (der.ellipse(b, axis), der.rectangle(b, _log(random, 1e-4, b), axis))
         apex = float(random.choice([0.1, 1.0, 170.0]))
         rings = (*thin, triangle_in_degrees(apex, 1e-4))
         found["ring"] = rings[int(random.integers(3))].to_json()
     else:
-        found["ring"] = circle(float(random.choice([-1.0, 1.0])) * _log(random, 4.0, 1e4)).to_json()
+        found["ring"] = der.circle(
+            float(random.choice([-1.0, 1.0])) * _log(random, 4.0, 1e4)
+        ).to_json()
     if which != "gamma_max" and random.random() < 0.3:
         wants |= {"control": "angle", "unload": True}
     return found | {"wants": wants}

@@ -25,18 +25,9 @@ from der.rod.free_ring import balance
 from der.rod.gripped_ring import GrippedRing
 from der.scene import CROSSINGS_UP_TO, Scene
 from der.utils.checks import Array
+from validation.stress import checks
 from validation.stress.cases import KINDS, scene_of
-from validation.stress.checks import (
-    Fault,
-    asymmetry,
-    denser,
-    faults,
-    not_converged,
-    outside_error_bars,
-    too_uncertain,
-    unlike,
-    work_lost,
-)
+from validation.stress.checks import Fault
 from validation.stress.inputs import PERHAPS, arguments, refusal
 from validation.stress.random_rings import LOOSE
 
@@ -79,7 +70,7 @@ def _finished_or_not(solver: Callable[[Scene], Path], scene: Scene) -> Path:
 def unfinished(path: Path) -> Iterator[Fault]:
     """Why a path is not finished."""
     if path.status != "done":
-        yield not_converged(path.reason), path.message
+        yield checks.not_converged(path.reason), path.message
 
 
 def _path(parameters: Mapping[str, Any]) -> Iterator[Fault]:
@@ -95,12 +86,12 @@ def _path(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 def _judged(scene: Scene, path: Path) -> Iterator[Fault]:
     if not len(path):
         return
-    yield from faults(scene, path)
+    yield from checks.faults(scene, path)
     if path.shapes is not None:
         yield from balanced(scene, path, path.shapes)
         symmetric = scene.control == "arclength" or scene.sector == "auto"
         if symmetric and scene.tolerance <= LOOSEST and scene.ring.shape != "profile":
-            off = asymmetry(scene, path.shapes)
+            off = checks.asymmetry(scene, path.shapes)
             # at a branch point the ring can move along the other path at no cost
             off[[point.position for point in path.branches]] = 0.0
             if (worst := float(off.max(initial=0.0))) > SYMMETRIC:
@@ -111,10 +102,10 @@ def _judged(scene: Scene, path: Path) -> Iterator[Fault]:
 
 def _work(scene: Scene, path: Path, solver: Callable[[Scene], Path]) -> Iterator[Fault]:
     """Energy is work; where the states are too few to tell, the path is solved with more."""
-    if path.status != "done" or work_lost(path) <= LOOSE:
+    if path.status != "done" or checks.work_lost(path) <= LOOSE:
         return
-    gammas = denser(path, scene.gamma_max)
-    lost = work_lost(
+    gammas = checks.denser(path, scene.gamma_max)
+    lost = checks.work_lost(
         solver(replace(scene, save_at=gammas, shapes=False, error_bars=False)), asked=True
     )
     if lost > LOOSE:
@@ -200,8 +191,10 @@ def _bvp(parameters: Mapping[str, Any]) -> Iterator[Fault]:
 
     path = _finished_or_not(solver, scene)
     yield from unfinished(path)
-    yield from (fault for fault in faults(scene, path) if tolerance < 1e-5 or fault[0] != "start")
-    yield from too_uncertain(path, tolerance)
+    yield from (
+        fault for fault in checks.faults(scene, path) if tolerance < 1e-5 or fault[0] != "start"
+    )
+    yield from checks.too_uncertain(path, tolerance)
     if tolerance <= 1e-5 and len(path):
         yield from _work(scene, path, solver)
 
@@ -217,7 +210,7 @@ def _compare(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     found: list[Fault] = []
     for finer in (1, 2, 4):
         path = der.fold(replace(scene, n_edges=finer * scene.n_edges))
-        found = list(outside_error_bars(path, reference, TIMES))
+        found = list(checks.outside_error_bars(path, reference, TIMES))
         if len(path.folds) == len(reference.folds):
             break
     yield from found
@@ -229,7 +222,7 @@ def _symmetry(parameters: Mapping[str, Any]) -> Iterator[Fault]:
     for path in found:
         yield from unfinished(path)
     if all(path.status == "done" for path in found):
-        yield from unlike(found[0], found[1], 1e-7)
+        yield from checks.unlike(found[0], found[1], 1e-7)
 
 
 def _steps(parameters: Mapping[str, Any]) -> Iterator[Fault]:
@@ -240,7 +233,7 @@ def _steps(parameters: Mapping[str, Any]) -> Iterator[Fault]:
         other = _folded(scene)
     yield from unfinished(other)
     if usual.status == other.status == "done":
-        yield from unlike(usual, other, 1e-7)
+        yield from checks.unlike(usual, other, 1e-7)
 
 
 @contextmanager
