@@ -95,18 +95,14 @@ def _diagram(wanted: PhaseOptions, name: str, folder: File) -> str:
     from der.analysis.fold import fold
     from der.diagram.diagram import doubts, phase_diagram, summary
 
+    same = ("workers", "scheduler", "resume", "nu", "sample", "finest")
     diagram = phase_diagram(
         name,
         folder,
-        workers=wanted.workers,
-        scheduler=wanted.scheduler,
-        resume=wanted.resume,
-        nu=wanted.nu,
         ranges=dict(map(_range, wanted.span or ())),
         check=fold if wanted.check else None,
-        sample=wanted.sample,
-        finest=wanted.finest,
         progress=not wanted.quiet,
+        **{option: getattr(wanted, option) for option in same},
     )
     for words in doubts(diagram):
         say(f"der: {name}: {words}")

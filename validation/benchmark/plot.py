@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
-from der.paper.canvas import INK, QUIET, page, save
+from der.paper.canvas import INK, QUIET, page
 from validation.benchmark.methods import BOUNDARY_VALUE, RELAXATION, STEPPING
 from validation.benchmark.rows import Trial, front
 from validation.benchmark.state import PEER
@@ -32,16 +31,6 @@ LOOKS = {
     PEER: ("#000000", "X", True, True),
 }
 COLUMNS = 4
-
-
-def draw_errors(trials: Sequence[Trial], file: File) -> File:
-    """Write the picture of error over CPU time, axes for each ring."""
-    return save(figure_of_errors(trials), file)
-
-
-def draw_costs(scales: Sequence[Scale], file: File) -> File:
-    """Write the picture of time and memory over the number of edges."""
-    return save(figure_of_costs(scales), file)
 
 
 def figure_of_errors(trials: Sequence[Trial]) -> Figure:

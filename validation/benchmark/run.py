@@ -17,7 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from der.utils.checks import shown
-from der.utils.files import write_whole
+from der.utils.files import Saved
 from validation.benchmark import methods, needs, orders, paths, rings, scaling, start, state, sweep
 from validation.benchmark.cited import CITED, cited
 from validation.benchmark.extent import FULL, QUICK, Extent
@@ -49,7 +49,7 @@ PARTS = tuple(_ROWS)
 
 
 @dataclass
-class Found:
+class Found(Saved):
     """Everything that was measured."""
 
     rows: list[Row] = field(default_factory=list)
@@ -106,10 +106,9 @@ def run(
             found.add(one)
             print(one, flush=True)
     finally:  # Ctrl-C keeps what was measured
-        for target in [file, *([] if out is None else [out / "bench.json"])]:
+        for target in (file, out and out / "bench.json"):
             if target is not None:
-                content = found.to_json().encode()
-                write_whole(target, lambda opened, content=content: opened.write(content))  # type: ignore[misc]
+                found.save(target)
         if out is not None:
             _draw(found, out)
     print(cited())
@@ -128,9 +127,10 @@ def measure(extent: Extent, only: tuple[str, ...]) -> Iterator[Measurement]:
 
 def _draw(found: Found, out: Path) -> None:
     """Draw what was measured."""
-    from validation.benchmark.plot import draw_costs, draw_errors
+    from der.paper.canvas import save
+    from validation.benchmark.plot import figure_of_costs, figure_of_errors
 
     if any(trial.error is not None for trial in found.trials):
-        print(f"wrote {draw_errors(found.trials, out / 'bench_error.png')}")
+        print(f"wrote {save(figure_of_errors(found.trials), out / 'bench_error.png')}")
     if found.scales:
-        print(f"wrote {draw_costs(found.scales, out / 'bench_cost.png')}")
+        print(f"wrote {save(figure_of_costs(found.scales), out / 'bench_cost.png')}")
