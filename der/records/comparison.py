@@ -103,7 +103,5 @@ class Comparison(Record, name="comparison", plot="comparison"):
     @property
     def largest(self) -> tuple[float, float]:
         """Largest distances in M and in U."""
-        return (
-            max((state.moment_distance for state in self.states), default=math.nan),
-            max((state.energy_distance for state in self.states), default=math.nan),
-        )
+        moment = max((state.moment_distance for state in self.states), default=math.nan)
+        return moment, max((state.energy_distance for state in self.states), default=math.nan)

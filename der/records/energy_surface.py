@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from der.records.entries import Checked, Entry
 from der.records.record import RingRecord, SolveTime
-from der.records.values import Column, Number, Text, gaps, table
+from der.records.values import Column, Number, Text, gaps, nested, table
 from der.utils import checks
 from der.utils.checks import Array, optional
 
@@ -23,26 +23,14 @@ Minima = tuple[tuple[tuple[float, ...], ...], ...]
 
 def _indices(name: str, given: Any) -> Counts:
     """Counts, -1 in memory and null in the file where not known."""
-    rows = given.tolist() if isinstance(given, np.ndarray) else given
     known = optional(lambda at, value: -1 if value == -1 else checks.count(at, value))
-    found = checks.each(name, rows, lambda at, row: checks.each(at, row, known))
+    found = nested(known, 2)(name, given.tolist() if isinstance(given, np.ndarray) else given)
     return np.array([[-1 if i is None else i for i in row] for row in found], dtype=np.int64)
-
-
-def _minima(name: str, given: Any) -> Minima:
-    """Nested tuples of energies."""
-
-    def cell(at: str, values: Any) -> tuple[float, ...]:
-        return tuple(checks.each(at, values, checks.checked_number))
-
-    def row(at: str, values: Any) -> tuple[tuple[float, ...], ...]:
-        return tuple(checks.each(at, values, cell))
-
-    return tuple(checks.each(name, given, row))
 
 
 _GRID = ("gamma", "distance")
 _MAP = gaps(*_GRID)
+_MINIMA = Entry(nested(checks.checked_number, 3), dims=_GRID)
 _INDEX = Entry(
     _indices, lambda index: [[None if i < 0 else i for i in row] for row in index.tolist()], _GRID
 )
@@ -71,7 +59,7 @@ class Surface(RingRecord, name="energy surface", kind="surface", plot="energy_su
     moment: Annotated[Array, _MAP]  # (n, m) of one arm, (1/4) dU/dgamma
     force: Annotated[Array, _MAP]  # (n, m) dU/d(distance): tension in the grips, GJ/a^2
     index: Annotated[Counts, _INDEX]  # (n, m) unstable modes, both held; -1: not known
-    minima: Annotated[Minima, Entry(_minima, dims=_GRID)]  # energies of all minima, ascending
+    minima: Annotated[Minima, _MINIMA]  # energies of all minima, ascending
     reasons: tuple[NoMinimum, ...]
     path: Annotated[Array, table(*_GRID, "energy")]  # (k, 3) along the path of twisting
     folds: Annotated[Array, gaps(None, 3)]  # gamma, distance, energy where gamma turns back

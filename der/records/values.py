@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from der.records.entries import Entry
+from der.records.entries import Check, Entry
 from der.utils import checks
 from der.utils.checks import Array
 
@@ -30,6 +30,14 @@ Integer = Annotated[int, Entry(integer)]
 Text = Annotated[str, Entry(checks.text)]
 Truth = Annotated[bool, Entry(checks.truth)]
 Json = Annotated[Mapping[str, object], Entry(checks.json_object)]
+
+
+def nested(check: Check, depth: int) -> Check:
+    """The check of tuples in tuples, ``depth`` of them, of values with a check."""
+    if depth == 0:
+        return check
+    inner = nested(check, depth - 1)
+    return lambda name, values: tuple(checks.each(name, values, inner))
 
 
 # --- Arrays ----------------------------------------------------------------------------------
