@@ -18,11 +18,11 @@ from der.viz.curve import smooth
 from der.viz.plots import style
 from der.viz.titles import ring_text, section_text
 
-LINES: tuple[tuple[str, str, Any, float], ...] = (  # label, colour, style, width
-    ("equilibria", "#9ec9e8", "-", 3.2),
-    ("loading", canvas.INK, (0, (4.0, 1.8)), 1.3),
-    ("unloading", palette.UNSTABLE, (0, (1.0, 1.4)), 1.7),
-)
+LINES: dict[str, dict[str, Any]] = {
+    "equilibria": {"color": "#9ec9e8", "linestyle": "-", "linewidth": 3.2},
+    "loading": {"color": canvas.INK, "linestyle": (0, (4.0, 1.8)), "linewidth": 1.3},
+    "unloading": {"color": palette.UNSTABLE, "linestyle": (0, (1.0, 1.4)), "linewidth": 1.7},
+}
 STAR = style.mark("*", 8.0) | {"zorder": 5}
 ROWS = (("moment", "$M\\,a/GJ$"), ("energy", "$U\\,a/GJ$"))
 
@@ -44,10 +44,7 @@ def figure_of_loops(loops: list[Loop]) -> Figure:
         axes[0].tick_params(labelbottom=False)
         style.zero_line(axes[0])
         axes[1].set_xlabel("$\\gamma/\\pi$", fontsize=9, color=canvas.INK)
-    handles = [
-        style.entry(label, color=colour, linestyle=dashes, linewidth=width)
-        for label, colour, dashes, width in LINES
-    ]
+    handles = [style.entry(label, **look) for label, look in LINES.items()]
     style.legend_below(figure, [*handles, style.entry("end state of a snap", **STAR)], fontsize=8.5)
     return figure
 
@@ -89,8 +86,8 @@ def _draw(panel: Axes, loop: Loop, name: str) -> None:
         _between(turned, name, 0, loop.top),
         _between(turned, name, loop.top, len(turned) - 1),
     )
-    for curve, (_, colour, dashes, width) in zip(curves, LINES, strict=True):
-        panel.plot(*curve.T, color=colour, linestyle=dashes, linewidth=width)
+    for curve, look in zip(curves, LINES.values(), strict=True):
+        panel.plot(*curve.T, **look)
     at = [snap.position for snap in loop.snaps]
     panel.plot(turned.gamma[at] / math.pi, getattr(turned, name)[at], **STAR)
     panel.margins(x=0.03, y=0.07)

@@ -67,6 +67,15 @@ _SCENES = ("scene", "scene2")  # plotly's names of the views of the rings
 EYE = {"x": 1.14, "y": 0.64, "z": 0.48}
 
 
+PLACES = {  # domains (x, y) of views and of both curves, by the number of rings
+    1: ([([0.0, 0.52], [0.0, 1.0])], [([0.6, 1.0], [0.55, 1.0]), ([0.6, 1.0], [0.0, 0.45])]),
+    2: (
+        [([0.0, 0.48], [0.42, 1.0]), ([0.52, 1.0], [0.42, 1.0])],
+        [([0.05, 0.47], [0.0, 0.36]), ([0.56, 1.0], [0.0, 0.36])],
+    ),
+}
+
+
 def save_html(path: Path | Sequence[Path], file: FilePath, *, frames: int = FRAMES) -> None:
     """Write the page of a path, or of two beside each other, atomically.
 
@@ -245,14 +254,10 @@ def _range(paths: Sequence[Path], name: str) -> list[float]:
 
 def _layout(paths: Sequence[Path], motions: Sequence[Motion]) -> dict[str, Any]:
     """Places and limits of the views, which never change."""
-    if len(motions) == 2:
-        domains = {"scene": ([0.0, 0.48], [0.42, 1.0]), "scene2": ([0.52, 1.0], [0.42, 1.0])}
-        (mx, my), (ux, uy) = ([0.05, 0.47], [0.0, 0.36]), ([0.56, 1.0], [0.0, 0.36])
-    else:
-        domains = {"scene": ([0.0, 0.52], [0.0, 1.0])}
-        (mx, my), (ux, uy) = ([0.6, 1.0], [0.55, 1.0]), ([0.6, 1.0], [0.0, 0.45])
+    views, ((mx, my), (ux, uy)) = PLACES[len(motions)]
     scene = _scene(motions)
-    scenes = {name: scene | {"domain": {"x": x, "y": y}} for name, (x, y) in domains.items()}
+    places = [{"domain": {"x": x, "y": y}} for x, y in views]
+    scenes = {name: scene | place for name, place in zip(_SCENES, places, strict=False)}
     turned, turns = "rotation of a grip, γ/π", [v / math.pi for v in _range(paths, "gamma")]
     moments, energies = _range(paths, "moment"), _range(paths, "energy")
     return {

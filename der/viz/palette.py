@@ -9,7 +9,7 @@ from der.viz.curve import SNAP
 INK, QUIET, PALE = "#222222", "#8a8a8a", "#dddddd"
 STABLE, UNSTABLE, FREE, ROSE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"  # Okabe and Ito
 PAIR = (STABLE, ROSE)  # of two rings whose curves share axes
-DASHES = (0, (3.5, 1.6))  # of what is unstable
+DASHES = (0, (3.5, 1.6))  # of unstable curves
 
 
 class Stretch(NamedTuple):
@@ -21,14 +21,14 @@ class Stretch(NamedTuple):
     dash: str  # of plotly
 
 
-# by what `curve.stretches` says of a stretch
+# by the stability of a stretch in `curve.stretches`
 STRETCHES: dict[bool | str | None, Stretch] = {
     True: Stretch("stable at fixed γ", STABLE, "-", "solid"),
     False: Stretch("unstable at fixed γ", UNSTABLE, DASHES, "dash"),
     None: Stretch("equilibria (stability not computed)", STABLE, "-", "solid"),
     SNAP: Stretch("snap", QUIET, (0, (1.2, 1.4)), "dot"),
 }
-POINTS = {  # what special points are called, by their kind
+POINTS = {  # names of special points, by their kind
     "fold": "fold",
     "limit": "limit of M",
     "branch": "branch point",

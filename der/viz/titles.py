@@ -1,4 +1,4 @@
-"""The title of every picture: ring, section, mesh, and what else is to be said."""
+"""The title of every picture: ring, section, mesh and further facts."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def names(paths: Sequence[Path]) -> list[str]:
 
 
 def _solver(path: Path, paths: Sequence[Path]) -> str:
-    """What solved a path; where all are of rods, how."""
+    """The solver of a path; where all paths are of rods, its method."""
     method = path.numerics.get("solver")
     if method is not None and all(one.solver == "der" for one in paths):
         return f"{SOLVERS['der']} by {method}"

@@ -1,4 +1,4 @@
-"""The paper's figures: what is written holds what is known, and one that fails harms no other."""
+"""The paper's figures: their tables have known values, and a failure affects no other figure."""
 
 import csv
 import json
@@ -166,7 +166,7 @@ def test_a_figure_that_fails_is_named_and_the_others_are_drawn(tmp_path, monkeyp
 
 
 def test_ctrl_c_ends_what_is_being_drawn_and_keeps_what_is_finished(tmp_path):
-    """The parent alone is interrupted; it ends its workers, which tidy up behind them."""
+    """Only the parent is interrupted; it ends its workers, which remove their files."""
     script = tmp_path / "script.py"
     script.write_text(
         "import time\nfrom pathlib import Path\n"

@@ -1,4 +1,4 @@
-"""Animations resampled and in step: each step is where the path is, or between two states."""
+"""Animations resampled and in step: each step is a state of the path or lies between two."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def loop():
 
 
 def test_steps_are_of_about_equal_motion(path):
-    """No vertex moves more than three times as far in a step as it does on average."""
+    """In no step does a vertex move more than three times its average distance."""
     motion = resampled(path, 100)
     moved = np.linalg.norm(np.diff(motion.x, axis=0), axis=2).max(axis=1)
     assert moved.max() < 3 * moved.mean()
@@ -194,7 +194,7 @@ def test_an_event_is_said_for_a_while(path):
 
 
 def test_names_name_all_that_differs(path):
-    """Shape, axis, solver, also where h/t alone would tell two paths apart."""
+    """Shape, axis and solver, also where h/t alone distinguishes two paths."""
     ellipse = {"shape": "ellipse", "twist_axis": "x"}
     slim = {**path.section, "h_over_t": 4.0}
     one = replace(path, ring={**ellipse, "b_over_a": 0.6})

@@ -1,4 +1,4 @@
-"""A page for any browser: whole in one file, and, where a browser is found, seen to work in it."""
+"""A page for any browser: complete in one file, and tested in a browser where one is found."""
 
 import base64
 import errno

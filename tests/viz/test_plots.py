@@ -1,4 +1,4 @@
-"""The picture of a path shows what the record says, and is saved whole or with a clear error."""
+"""The picture of a path shows the record, and is saved completely or with a clear error."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""A recording shows what the record says, is read back here, and is written whole or not at all."""
+"""A recording shows the record, is read back here, and is written completely or not at all."""
 
 import errno
 import subprocess

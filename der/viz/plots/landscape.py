@@ -27,8 +27,7 @@ def draw(landscape: Landscape) -> Figure:
         If the path has no state.
     """
     path = landscape.path
-    if not len(path):
-        raise ValueError("landscape must have at least one state to be plotted, got none")
+    style.check_states("landscape", path)
     zoomed = landscape.barriers.open is not None
     figure = style.blank(8.6 if zoomed else 6.0, 4.6, title(path))
     left, right = (0.075, 0.5645) if zoomed else (0.105, 0.985)

@@ -35,8 +35,7 @@ def draw(path: Path) -> Figure:
     ValueError
         If the path has no state.
     """
-    if not len(path):
-        raise ValueError("path must have at least one state to be plotted, got none")
+    style.check_states("path", path)
     status = () if path.status == "done" else (path.status,)
     figure = style.blank(
         8.0, 6.0, title(path, _mode(path.mode) if path.mode else _reach(path), *status)

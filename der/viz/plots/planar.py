@@ -32,8 +32,7 @@ def draw(found: PlanarStates) -> Figure:
     ValueError
         If there is no state.
     """
-    if not len(found):
-        raise ValueError("states must be at least one to be plotted, got none")
+    style.check_states("record", found)
     rows = math.ceil(len(found) / COLUMNS)
     columns = math.ceil(len(found) / rows)
     width, height = max(columns * CELL, 5.4) + 0.3, rows * ROW + 0.95

@@ -32,8 +32,7 @@ def draw(found: Squeeze) -> Figure:
     ValueError
         If there is no state.
     """
-    if not len(found):
-        raise ValueError("states must be at least one to be plotted, got none")
+    style.check_states("record", found)
     pulled = found.distance[-1] > found.distance[0]
     figure = style.blank(7.6, 5.6, title(found, "pulled" if pulled else "squeezed", mesh=False))
     chosen = _chosen(found)

@@ -43,8 +43,7 @@ def draw(found: States) -> Figure:
     ValueError
         If there is no state.
     """
-    if not len(found):
-        raise ValueError("states must be at least one to be plotted, got none")
+    style.check_states("record", found)
     shown = found.states[:MOST]
     n = len(shown)
     width = max(NARROWEST, COLUMN * n + 0.9)

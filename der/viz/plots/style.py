@@ -6,7 +6,7 @@ Figures are made without pyplot: no global state changes, and no display is need
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Sized
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,12 @@ def save(figure: Figure, file: FilePath) -> None:
     # matplotlib's version is left out, so that equal pictures are equal files
     metadata: dict[str, Any] = {"Software": None} if suffix == ".png" else {}
     write("plot", file, lambda at: figure.savefig(at, format=suffix[1:], metadata=metadata))
+
+
+def check_states(name: str, found: Sized) -> None:
+    """Refuse a record without states: there is nothing to draw."""
+    if not len(found):
+        raise ValueError(f"{name} must have at least one state to be plotted, got none")
 
 
 def blank(width: float, height: float, title: str, *, dpi: int = DPI) -> Figure:

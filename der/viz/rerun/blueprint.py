@@ -129,7 +129,7 @@ def _log_and_about() -> rrb.Horizontal:
 
 
 def _aside() -> tuple[rrb.BlueprintPanel, rrb.SelectionPanel]:
-    """The viewer's own panels, out of the way."""
+    """The viewer's own panels, collapsed."""
     return rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed")
 
 
@@ -140,8 +140,8 @@ def _ring_view(
 
     Parameters
     ----------
-    under, name : of a ring that is not alone.
-    size : that the camera's distance goes with; the ring's own if not given.
+    under, name : of a ring beside another one.
+    size : to which the camera's distance is proportional; the ring's own if not given.
     """
     mapping = VisualizerComponentMapping(
         "Mesh3D:vertex_colors",
@@ -168,7 +168,7 @@ def _ring_view(
 
 
 def _eye(position: ArrayLike, target: ArrayLike) -> rrb.EyeControls3D:
-    """The eye that sees a scene, the twisting axis upright."""
+    """A camera with the twisting axis upright."""
     up = [0.0, 0.0, 1.0]
     return rrb.EyeControls3D(kind="orbital", position=position, look_target=target, eye_up=up)
 
