@@ -1,7 +1,7 @@
-"""The seam between mechanics and continuation: what a system must say to be followed.
+"""The seam between mechanics and continuation: the operations of a system that can be followed.
 
-A `System` is anything that rests where a residual vanishes and has one parameter: a rod in space or
-in a plane, a ring in its grips or in an actuator, a scalar equation. It offers five operations:
+A `System` has equilibria, where a residual vanishes, and one parameter: a rod in space or in a
+plane, a ring in its grips or in an actuator, a scalar equation. It offers five operations:
 
     correct      an equilibrium near a guess, under one condition that closes the equations
     retract      the state that an increment leads to
@@ -67,8 +67,23 @@ class Solution(Generic[S]):
         return f"{self.detail} {self.reason.value}".strip()
 
 
+@dataclass(frozen=True, slots=True)
+class LoadedSolution(Solution[S]):
+    """A solution with the observables "moment", conjugate to the load, and "energy"."""
+
+    @property
+    def moment(self) -> float:
+        """DL/dload, work-conjugate to the load."""
+        return self.observables["moment"][0]
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy."""
+        return self.observables["energy"][0]
+
+
 class System(Protocol[S]):
-    """A system with one parameter that rests where its residual vanishes."""
+    """A system with one parameter; it is in equilibrium where its residual vanishes."""
 
     @property
     def parameter_name(self) -> str:
@@ -121,7 +136,7 @@ class Stability(System[S], Protocol[S]):
 
     @property
     def soft(self) -> float:
-        """Stiffness of a mode below which it is looked at for two changes of sign in one step."""
+        """Stiffness of a mode below which two changes of sign are looked for within one step."""
 
     def indices(self, state: S, symmetry: str | None = None) -> tuple[Indices, tuple[float, ...]]:
         """Return certified index and lowest stiffness of every class, or of one."""
@@ -174,7 +189,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Point(Generic[A]):
-    """A solution on the path, as it is handed out."""
+    """A solution on the path, with its kind and index."""
 
     solution: A
     kind: str = ""  # "", "fold", "limit", "branch", or the kind of a further event

@@ -19,7 +19,7 @@ import math
 
 import der
 from der.analysis.landscape.actuators import struts
-from der.analysis.landscape.barrier import ALIKE, twisted_rests
+from der.analysis.landscape.barrier import ALIKE, twisted_states
 from der.analysis.landscape.opening_path import opened
 from scenarios.output import folder, keep, usage
 
@@ -29,7 +29,7 @@ if __name__ == "__main__":
 N_EDGES = 48
 SECTION = der.rectangular_section(4.0)
 
-rests, free_rings, twisting, _ = twisted_rests(der.Scene(der.circle(), SECTION, n_edges=N_EDGES))
+rests, free_rings, twisting, _ = twisted_states(der.Scene(der.circle(), SECTION, n_edges=N_EDGES))
 lift = struts(free_rings[-1], (0, N_EDGES // 3))[0]
 lifted = opened(lift, rests[-1].energy, ALIKE * rests[-1].energy)
 

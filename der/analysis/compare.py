@@ -1,10 +1,10 @@
-"""Rod against boundary-value problem: every state of the one held against the other's path.
+"""Comparison of the rod with the boundary-value problem, at every state of the rod.
 
-A state of the rod has errors in gamma, M and U; what can be compared without matching states is its
-normal distance from the curve of the boundary-value problem, in (gamma/pi, M/max|M|) and in
-(gamma/pi, U/max U). That curve is solved for at every gamma of the rod's states, with its exact
-slopes (dM/dgamma from the linearised problem, dU/dgamma = 4 M), so the distance is that from a
-tangent: no interpolation. Folds and limits are compared one by one.
+A state of the rod has errors in gamma, M and U. It is compared by its normal distance from the
+curve of the boundary-value problem, in (gamma/pi, M/max|M|) and in (gamma/pi, U/max U), so states
+need not be matched. The curve is solved for at every gamma of the rod's states, with exact slopes
+(dM/dgamma from the linearised problem, dU/dgamma = 4 M). The distance is that from a tangent,
+without interpolation. Folds and limits are compared one by one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from der.scene import Scene
 
 TOLERANCE = 1e-10  # of the boundary-value problem: below the rod's error bars
 SAME = 1e-9  # rad: two crossings of the same gamma
-FAR = 0.05  # of the scaled plane; what lies farther apart belongs to another branch
+FAR = 0.05  # of the scaled plane; a state farther away belongs to another branch
 
 
 def compare(
@@ -34,22 +34,22 @@ def compare(
     tolerance: float = TOLERANCE,
     progress: Callable[[float], object] | None = None,
 ) -> Comparison:
-    """Hold the rod's path of a scene against the boundary-value problem's.
+    """Compare the path of a scene by the rod with that by the boundary-value problem.
 
     Parameters
     ----------
-    scene : what was folded, by arc length.
-    rod : its path, where `der.fold` has found it already. With error bars (`Scene.error_bars`) it
-        is said whether both agree.
+    scene : controlled by arc length.
+    rod : its path, if `der.fold` has found it already. With error bars (`Scene.error_bars`) the
+        comparison tells whether both agree.
     tolerance : of the boundary-value problem, see `solve_bvp`.
     progress : called with gamma [rad] after every state of either path.
 
     Raises
     ------
     ValueError
-        For a scene that the boundary-value solver cannot do, or a path that is not of a rod.
+        For a scene that the boundary-value solver cannot solve, or a path that is not of a rod.
     NotConverged
-        Where a path cannot be followed to its end.
+        If a path cannot be followed to its end.
     """
     if rod is None:
         from der.analysis.fold import fold
@@ -84,7 +84,7 @@ def _last(scene: Scene) -> float:
 def _state(
     rod: Path, k: int, points: Sequence[Point], scales: Mapping[str, float], tolerance: float
 ) -> ComparedState | None:
-    """State k of the rod beside the solution at its gamma that is nearest in M and U."""
+    """State k of the rod, and the solution at its gamma that is nearest in M and U."""
     gamma = float(rod.gamma[k])
     values = {name: float(getattr(rod, name)[k]) for name in scales}
 
@@ -137,7 +137,7 @@ def _distance(
 
 
 def _errors(rod: Path, k: int) -> Mapping[str, float] | None:
-    """Error bars of state k; None where one is not known."""
+    """Error bars of state k; None: one is not known."""
     if rod.error is None:
         return None
     bars: Mapping[str, Any] = rod.error
@@ -146,7 +146,7 @@ def _errors(rod: Path, k: int) -> Mapping[str, float] | None:
 
 
 def _pairs(rod: Path, bvp: Path) -> tuple[list[ComparedPoint], int]:
-    """Folds and limits of both, matched in path order; and how many are left over."""
+    """Folds and limits of both, matched in path order; and the number of unmatched ones."""
     pairs: list[tuple[int, ComparedPoint]] = []
     alone = 0
     for kind in ("fold", "limit"):

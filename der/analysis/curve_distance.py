@@ -1,7 +1,7 @@
-"""Reference curves, and how far a computed path lies from one.
+"""Reference curves, and the distance of a computed path from one.
 
-The error is a normal distance in scaled planes, not a difference at equal gamma: that one grows
-without bound on steep parts and has no meaning at folds.
+The error is a normal distance in scaled planes, not a difference at equal gamma: such a difference
+grows without bound on steep parts and has no meaning at folds.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Interpolant(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ReferenceCurve:
-    """A path of equilibria computed by someone else.
+    """A path of equilibria from another program.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ class ReferenceCurve:
     energy : (n,) array
         Energy of the FULL ring, GJ/a.
     others : (n, m) array
-        Other smooth components of the same solutions, any unit; m = 0 is allowed. They tell the
-        interpolant how fast the state moves where (gamma, M) alone turns sharply.
+        Other smooth components of the same solutions, any unit; m = 0 is allowed. They improve the
+        interpolant where the curve (gamma, M) turns sharply.
     folds : tuple of float
         gamma at the folds, rad, in path order.
     header : str

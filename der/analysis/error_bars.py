@@ -1,7 +1,7 @@
 """Error bars: the path on N, N/2 and N/4 edges, extrapolated state by state (Richardson, Romberg).
 
-The states of the three meshes are matched one by one, and put where they belong on the extrapolated
-curve (`extrapolated_curve`). An error is the last correction that the extrapolation made.
+The states of the three meshes are matched one by one, and moved to their places on the extrapolated
+curve (`extrapolated_curve`). An error is the last correction of the extrapolation.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from der.rod.gripped_ring import GrippedRing
 
 _EXACT = 1e-9  # of the largest values: a state that is the same on every mesh, as the folded one
 _REST = 3.0  # see `_Corrections.bound`
-_SMALL = 0.01  # of the largest first correction: what is below says nothing of how fast they fall
+_SMALL = 0.01  # of the largest first correction: smaller ones do not count for their ratio
 
 
 @dataclass(frozen=True)
 class ErrorBars:
-    """The points of a path, extrapolated, in path order; and what the record says of it.
+    """The extrapolated points of a path, in path order, and their entries in the record.
 
-    Where a level has no state, errors are None and the values are those of N edges.
+    If a level has no state, errors are None and the values are those of N edges.
     """
 
-    points: tuple[Point[Equilibrium], ...]  # (n,) see `error_bars` for what is missing
+    points: tuple[Point[Equilibrium], ...]  # (n,) see `error_bars` for those left out
     values: dict[str, Array]  # gamma, moment, energy (n,)
     raw: dict[str, list[float]]  # the same on N edges
     error: dict[str, object]  # the record's entry
     slope: float | None = None  # dM/dgamma at the first arrival at pi, GJ/a; None: no such state
 
     def at_pi(self, at_pi: AtPi | None, mode: Mode | None) -> dict[str, AtPi | Mode | None]:
-        """Return what is recorded at pi, with the extrapolated values."""
+        """Return the entries of the record at pi, with the extrapolated values."""
         if at_pi is None or mode is None or self.slope is None:
             return {"at_pi": at_pi, "mode": mode}
         k = self.values["gamma"].tolist().index(math.pi)
@@ -65,19 +65,18 @@ def error_bars(
     Parameters
     ----------
     rings : the sector at the three levels, finest first (`scene.meshes`).
-    request : what the path was asked for. Where a gamma was asked for, it stays what it is, and
-        moment and energy become those at this gamma on the extrapolated curve.
+    request : that of the path. A gamma that was asked for is kept; moment and energy become those
+        at this gamma on the extrapolated curve.
     points : the path on the finest mesh.
 
     Notes
     -----
     Folds and limits move to those of the extrapolated curve, a little forward or backward on the
-    path. States that nobody asked for and that they overtake are left out: their index would be
-    that of the other side. Branch points and self-crossings are placed on N edges only; they have
-    values on the extrapolated curve, but no errors. Indices, and the mode but for its slope, are
-    those of N edges, unknown where a state passes a fold or branch point on its way to the
-    extrapolated curve. Where the path of the coarsest mesh ends elsewhere, values stay as they are,
-    and no error is known.
+    path. States that were not asked for and that they pass are left out: their index would be that
+    of the other side. Branch points and self-crossings are located on N edges only; they have
+    values on the extrapolated curve, but no errors. Indices, and the mode apart from its slope, are
+    those of N edges, and unknown if the extrapolation moves a state past a fold or branch point. If
+    the path of the coarsest mesh ends elsewhere, values are not extrapolated, and errors unknown.
     """
     end = _end(rings[-1], request, max_steps=4 * len(points) + 100)
     if end != points[-1].solution.parameter:
@@ -88,7 +87,7 @@ def error_bars(
 def _extrapolated(
     rings: Sequence[GrippedRing], request: Request, points: Sequence[Point[Equilibrium]]
 ) -> ErrorBars:
-    """The same of a path of which the coarsest mesh may not reach the end."""
+    """The same, for a path whose end the coarsest mesh may not reach."""
     asked = _asked(request, points)
     family = Family(tuple(rings), request.tolerance)
     points = all_asked(family, request, points, asked)
@@ -108,15 +107,10 @@ def _asked(request: Request, points: Sequence[Point[Equilibrium]]) -> set[float]
 
 
 def _end(ring: GrippedRing, request: Request, *, max_steps: int) -> float | None:
-    """The gamma at which a path ends; None where it cannot be followed."""
+    """The gamma at which a path ends; None: it cannot be followed."""
     options = replace(request.options, aimed_turn=LOOSE_TURN, max_steps=max_steps)
     bare = replace(
-        request,
-        targets=(),
-        limits=False,
-        stability=False,
-        self_crossings=False,
-        options=options,
+        request, targets=(), limits=False, stability=False, self_crossings=False, options=options
     )
     try:
         return [one.solution.parameter for one in bare.follow(ring)][-1]
@@ -127,7 +121,7 @@ def _end(ring: GrippedRing, request: Request, *, max_steps: int) -> float | None
 def _without_errors(
     rings: Sequence[GrippedRing], points: Sequence[Point[Equilibrium]], end: float | None
 ) -> ErrorBars:
-    """Error bars that say that the coarsest mesh leads to another ``end``."""
+    """Error bars without errors: the path of the coarsest mesh has another ``end``."""
     where = "cannot be followed to an end" if end is None else f"ends at gamma = {end:.6g}"
     values = columns(rings[0], points)
     how = (
@@ -142,10 +136,10 @@ def _without_errors(
 def _certain(
     points: Sequence[Point[Equilibrium]], order: Sequence[int]
 ) -> list[Point[Equilibrium]]:
-    """Points in another order, without the index of those that have passed a singular one."""
+    """Points in another order; those that have passed a singular one have no index."""
     place = {k: i for i, k in enumerate(order)}
     singular = [k for k in place if points[k].kind in ("fold", "branch")]
-    # a point that lay on the other side of a singular one: the meshes do not agree on its index
+    # a point that was on the other side of a singular one: its index depends on the mesh
     passed = {k for k in place if any((place[s] < place[k]) != (s < k) for s in singular)}
     return [replace(points[k], index=None, sides=None) if k in passed else points[k] for k in order]
 
@@ -156,19 +150,15 @@ def _bars(
     places: Sequence[Place | None],
     scales: Array,
 ) -> ErrorBars:
-    """Values and errors of points at their places."""
+    """Values and errors of points at their places on the extrapolated curve."""
     corrections = _Corrections.of(places, scales)
     bounds = [corrections.bound(k) for k in range(len(places))]
     raw = columns(family.rings[0], points)
-    values = {
-        name: np.array(
-            [
-                own if p is None else float(p.values[c])
-                for own, p in zip(raw[name], places, strict=True)
-            ]
-        )
-        for c, name in enumerate(COLUMNS)
-    }
+    table = np.array(list(raw.values()))
+    for k, place in enumerate(places):
+        if place is not None:
+            table[:, k] = place.values
+    values = dict(zip(COLUMNS, table, strict=True))
     slope, slope_error = _slope_at_pi(places, points, corrections)
     error: dict[str, object] = {
         name: [None if b is None else float(b[c]) for b in bounds] for c, name in enumerate(COLUMNS)
@@ -179,7 +169,7 @@ def _bars(
 
 
 def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
-    """Positions of the points in their order on the extrapolated curve, without overtaken ones."""
+    """Positions of the points in their order on the extrapolated curve, without passed ones."""
     at = [s + (0.0 if p is None else p.s) for s, p in zip(lengths, places, strict=True)]
     fixed = [p is not None and p.fixed for p in places]
     before = accumulate((a if f else -math.inf for a, f in zip(at, fixed, strict=True)), max)
@@ -188,16 +178,16 @@ def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
     kept = []
     for k, (low, high) in enumerate(zip(before, after, strict=True)):
         if places[k] is None:
-            at[k] = min(max(at[k], low), high)  # known on N edges only: among its old neighbours
+            at[k] = min(max(at[k], low), high)  # known on N edges only: between its old neighbours
         if at[k] > at[-1]:
-            continue  # a branch or contact point that has moved beyond the end of the path
+            continue  # a branch point or self-crossing that has moved beyond the end of the path
         if fixed[k] or places[k] is None or low < at[k] < high:
             kept.append(k)
     return sorted(kept, key=lambda k: at[k])
 
 
 def _scales(family: Family, points: Sequence[Point[Equilibrium]]) -> Array:
-    """What the columns of a table are measured in (6,): pi and the largest |M| and |U|."""
+    """Scales (6,) of the columns of a table: pi and the largest |M| and |U|."""
     values = np.array([family.values(0, point.solution) for point in points]).reshape(-1, RATE)
     largest = np.abs(values).max(axis=0, initial=0.0)
     largest[GAMMA] = math.pi
@@ -206,13 +196,13 @@ def _scales(family: Family, points: Sequence[Point[Equilibrium]]) -> Array:
 
 @dataclass(frozen=True)
 class _Corrections:
-    """What the two extrapolations change at the states of a path."""
+    """The corrections of the two extrapolations at the states of a path."""
 
     places: Sequence[Place | None]
-    first: Array  # (n, 6) T10 - T00; zero where there is no state
+    first: Array  # (n, 6) T10 - T00; zero if there is no state
     last: Array  # (n, 6) T20 - T10
     exact: NDArray[np.bool_]  # (n,) the same on every mesh; or no state
-    rest: float  # what the corrections left out may add, as a fraction of the first
+    rest: float  # estimate of all further corrections, as a fraction of the first
     remainder: Array  # (n, 6) the same, in the columns of the table
 
     @classmethod
@@ -232,16 +222,16 @@ class _Corrections:
         return cls(places, first, last, exact, rest, rest * scales * np.repeat(halves, RATE, 1))
 
     def bound(self, k: int) -> Array | None:
-        """Errors (3,) of the values at a place; None where they are not known.
+        """Errors (3,) of the values at a place; None: they are not known.
 
         Notes
         -----
-        The last correction, T20 - T10, is several times the error of T20 where the series of h is
-        well behaved. It passes through zero where the error does not, so it is the largest of a
-        state and its two neighbours, and the corrections to come are added as those of a geometric
-        series: the first correction times the square of the largest ratio of the two along the
-        path, times `_REST`. States close to the flat one, of next to no correction, do not count
-        for that ratio. The residual of the states is the floor.
+        The last correction, T20 - T10, is several times the error of T20 if the series in h
+        converges well. It may pass through zero where the error does not. So the largest one of a
+        state and its two neighbours is used, and an estimate of further corrections is added, by a
+        geometric series: the first correction times the square of the largest ratio of the two
+        along the path, times `_REST`. States close to the flat one, with almost no correction, do
+        not count for that ratio. An error is at least the residual of the states.
         """
         place = self.places[k]
         if place is None or not place.sought:
@@ -265,7 +255,7 @@ def _slope_at_pi(
     k = found[0]
     gamma_rate, moment_rate = place.table[:, RATE + GAMMA], place.table[:, RATE + MOMENT]
     plain, once, twice = romberg(moment_rate / gamma_rate)
-    # and by how much it changes if the state lies elsewhere on the curve
+    # and its change if the state lies elsewhere on the curve
     change = romberg(
         (place.bend[:, MOMENT] - moment_rate / gamma_rate * place.bend[:, GAMMA]) / gamma_rate
     )[-1]
@@ -275,7 +265,7 @@ def _slope_at_pi(
 
 
 def _how(rings: Sequence[GrippedRing], bounds: Sequence[Array | None]) -> str:
-    """How the errors were found, in a sentence."""
+    """How the errors were computed, in a sentence."""
     sizes = ", ".join(str(_edges(ring)) for ring in rings)
     text = (
         f"Romberg extrapolation from {sizes} edges, states matched in the planes normal to the path"

@@ -1,15 +1,15 @@
-"""The same state on three meshes, and where it lies on the curve that they extrapolate to.
+"""The same state on three meshes, and its place on the extrapolated curve.
 
-Frames sit on the same material points at every resolution, so every second (fourth) frame of a
-state on N edges is nearly a state on N/2 (N/4), and Newton's method makes it one in two or three
-iterations, folds or not, if its corrections stay in the plane normal to the path of N edges:
+Frames are at the same material points at every resolution, so every second (fourth) frame of a
+state on N edges is almost a state on N/2 (N/4) edges. Newton's method solves for it in two or three
+iterations, also at folds, if its corrections stay in the plane normal to the path of N edges:
 
     N      ----o---->  tangent        the three states of a plane are *matched*: gamma, M, U and
     N/2    ....|.....                 their rates along the tangent have errors in even powers
     N/4    ....|.....                 of h, h^2 first
 
-What is sought (a gamma that was asked for, a fold, a limit) is a root, along the path of N edges,
-of the extrapolated curve.
+A gamma that was asked for, a fold or a limit of the extrapolated curve is a root along the path of
+N edges.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ GAMMA, MOMENT, ENERGY = 0, 1, 2  # columns of a table of values
 RATE = 3  # added to these: columns of the rates along the path
 
 _PROBE = 1e-3  # of s: the first step towards a fold or limit, whose second derivative is not known
-_SMALL = 1e-6  # of s: a step that is as good as its linear prediction, to the square of this
-FARTHEST = 0.3  # of s: about two steps of the path; what is sought lies h^2 away
+_SMALL = 1e-6  # of s: after so small a step linear prediction is exact to its square
+FARTHEST = 0.3  # of s: about two steps of the path; the root is at a distance of order h^2
 _MOST = 12  # steps of the secant method
 
 
@@ -57,29 +57,21 @@ class Family:
         return self.rings[level].values(at)
 
     def matched(self, fine: Equilibrium, near: Restricted | None = None) -> Matched | None:
-        """The states matched to one on the finest mesh; None where a level has none.
+        """The states matched to one on the finest mesh; None: a level has none.
 
         ``near`` : those of a state nearby, to start from.
         """
         found = restricted(self.rings, fine, near, self.tolerance)
         if found is None:
             return None
-        table = np.array(
-            [
-                self._line(0, fine, 1.0, 0.0),
-                *(
-                    self._line(k, x.solution, x.speed, x.beyond)
-                    for k, x in enumerate(found, start=1)
-                ),
-            ]
-        )
-        residual = max(fine.residual, *(x.solution.residual for x in found))
-        return Matched(table, residual, found)
+        states = [(fine, 1.0, 0.0), *((x.solution, x.speed, x.beyond) for x in found)]
+        table = np.array([self._line(level, *state) for level, state in enumerate(states)])
+        return Matched(table, max(at.residual for at, _, _ in states), found)
 
     def _line(self, level: int, at: Equilibrium, speed: float, beyond: float) -> list[float]:
         """Values and rates at a level; ``speed`` turns the unit tangent to a rate per s.
 
-        The values are those ``beyond`` before the state, where its plane is.
+        The values are those in the plane, at the distance ``beyond`` before the state.
         """
         values = self.values(level, at)
         gamma_rate = speed * at.parameter_rate
@@ -112,12 +104,12 @@ class SoughtPoint(Point[Equilibrium]):
 
 @dataclass(frozen=True)
 class Place:
-    """A state of the extrapolated curve, and how an error of the curve moves it.
+    """A state of the extrapolated curve, and its sensitivity to errors of the curve.
 
     Notes
     -----
-    What is sought is F(s) = 0, F a column of the table less a constant. If the curve is off by
-    c(s), the root is off by ds = -c_F/F', and the values there by c + rates ds.
+    The state is a root of F(s), a column of the table less a constant. If the curve has an error
+    c(s), the root has the error ds = -c_F/F', and the values there c + rates ds.
     """
 
     s: float  # distance from the point along the path
@@ -125,21 +117,21 @@ class Place:
     residual: float
     values: Array  # (3,) gamma, M, U
     spread: Array  # (3, 6) error of values = spread . correction of the table's columns
-    bend: Array  # (LEVELS, 3) d rates/ds; zero where the state did not have to be sought
-    fixed: bool  # whether the place on the path means something
+    bend: Array  # (LEVELS, 3) d rates/ds; zero if the state is no root
+    fixed: bool  # whether its place on the path is significant
     sought: bool = True  # whether it is a place of the extrapolated curve; else of N edges
 
 
 class Goal(NamedTuple):
-    """What is sought on the extrapolated curve."""
+    """The condition of a root on the extrapolated curve."""
 
     column: int  # of the table
     value: float
-    direction: float  # where gamma is sought: sign of dgamma/ds on this side of a fold
+    direction: float  # for a root in gamma: sign of dgamma/ds on this side of a fold
 
 
 def _goal(point: Point[Equilibrium], asked: Collection[float]) -> Goal | None:
-    """What a point stands for; None: for nothing but a place on the curve."""
+    """The condition that defines a point; None: it is any point of the curve."""
     load = point.solution.parameter
     if isinstance(point, SoughtPoint):
         return Goal(GAMMA, *point.sought)
@@ -155,7 +147,7 @@ def _goal(point: Point[Equilibrium], asked: Collection[float]) -> Goal | None:
 def placed(
     family: Family, points: Sequence[Point[Equilibrium]], asked: Collection[float]
 ) -> Iterator[Place | None]:
-    """Where points belong on the extrapolated curve; None where a level has no state."""
+    """Yield the places of points on the extrapolated curve; None: a level has no state."""
     near = None
     for point in points:
         here = family.matched(point.solution, near)
@@ -166,7 +158,7 @@ def placed(
 def _placed(
     family: Family, point: Point[Equilibrium], here: Matched, asked: Collection[float]
 ) -> Place | None:
-    """Where a point belongs, ``here`` being matched to it."""
+    """The place of a point, to which ``here`` is matched."""
     goal = _goal(point, asked)
     if goal is not None:
         return _sought(family, point.solution, here, goal)
@@ -176,7 +168,7 @@ def _placed(
 
 
 def _sought(family: Family, base: Equilibrium, here: Matched, goal: Goal) -> Place | None:
-    """Where the goal is, by the secant method from ``base``, to which ``here`` is matched."""
+    """The place of a goal, by the secant method from ``base``, to which ``here`` is matched."""
     s, now, bend = 0.0, romberg(here.table)[-1], np.zeros((LEVELS, RATE))
     slope = float(now[RATE + goal.column]) if goal.column < RATE else 0.0
     for _ in range(_MOST):
@@ -205,7 +197,7 @@ def _advanced(here: Matched, step: float, bend: Array) -> Matched:
 def _found(goal: Goal, s: float, here: Matched, slope: float, bend: Array) -> Place | None:
     """The place of a goal; None for a gamma that lies beyond a fold of the extrapolated curve.
 
-    ``slope`` is the rate of what is sought along s.
+    ``slope`` is the rate of the goal's column along s.
     """
     line, spread = romberg(here.table)[-1], np.eye(RATE, 6)
     if goal.column == GAMMA:

@@ -1,12 +1,13 @@
-"""States asked for that lie between a fold on N edges and where the extrapolation puts that fold.
+"""States asked for that lie between a fold on N edges and the extrapolated fold.
 
                       . . . .           . extrapolated
     gamma asked   ---o-------o---       o its states, of which N edges have none
                     . * * * * .         * on N edges
                    . *       * .
 
-A fold that moves outward lets the curve reach gammas that N edges do not, twice each; one that
-moves inward takes them back. The record holds the states of the extrapolated curve.
+If the extrapolated fold lies further out, the curve reaches values of gamma that N edges do not
+reach, each twice. If it lies further in, some values are no longer reached. The record has the
+states of the extrapolated curve.
 """
 
 from __future__ import annotations
@@ -38,13 +39,13 @@ def arc_lengths(ring: GrippedRing, points: Sequence[Point[Equilibrium]]) -> Arra
 def all_asked(
     family: Family, request: Request, points: Sequence[Point[Equilibrium]], asked: Collection[float]
 ) -> list[Point[Equilibrium]]:
-    """The points with those put in, and taken out, that moving folds pass over, in path order.
+    """Return the points in path order, with those added and removed that moved folds pass.
 
     Parameters
     ----------
     points : the path on the finest mesh, from `Request.follow`.
-    asked : values of gamma that states were solved for [rad]. Those at which a path ends, or is
-        judged (pi), are left as they are.
+    asked : values of gamma that states were solved for [rad]. The ends of a path, and pi, are
+        left unchanged.
     """
     asked = [load for load in asked if abs(load) not in (math.pi, request.gamma_max)]
     lengths = arc_lengths(family.rings[0], points).tolist()
@@ -76,10 +77,9 @@ def _reached(
     bend: float,
     load: float,
 ) -> Iterator[tuple[float, Point[Equilibrium]]]:
-    """Distances from a fold, and states on N edges, of the two that are at ``load`` once it moves.
+    """Distances from a fold, and states on N edges, of the two at ``load`` beside the moved fold.
 
-    ``bend`` is d2gamma/ds2 of the extrapolated curve there; a state is left out where a mesh has
-    none.
+    ``bend`` is d2gamma/ds2 of the extrapolated curve there; a state is left out if a mesh has none.
     """
     away = math.sqrt(2.0 * (load - float(place.values[GAMMA])) / bend)
     for side in (-1.0, 1.0):

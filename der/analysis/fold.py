@@ -1,4 +1,4 @@
-"""`der.fold`: from the scene to the record of its path."""
+"""`der.fold`: the path of a scene, and its record."""
 
 from __future__ import annotations
 
@@ -76,7 +76,8 @@ def fold(
             watch(ring.vertices(one.solution.state))
 
     with Run() as run:
-        run.prepare(lambda: _load_kernels(request, snaps=scene.control != "arclength"))
+        counted = (request.stability, request.self_crossings)
+        run.prepare(lambda: _load_kernels(*counted, snaps=scene.control != "arclength"))
         points = run.collect(_points(scene, ring, request, statistics), tell)
         if run.done and points[-1].solution.parameter == -scene.gamma_max:
             run.note(Reason.TURNED_BACK)
@@ -88,10 +89,10 @@ def fold(
 
 
 def _request(scene: Scene) -> Request:
-    """What a scene asks for."""
+    """The request of a scene."""
     until_folded = scene.until == "folded"
     counting = scene.stability or scene.looks_for_self_crossings
-    # who lists the states that are wanted, and nothing between them, is not slowed by others
+    # if only listed states are wanted, steps may be longer
     turn = Options.aimed_turn if counting or scene.save_at is None else LOOSE_TURN
     return Request(
         gamma_max=math.inf if until_folded and scene.gamma_max <= math.pi else scene.gamma_max,
@@ -106,9 +107,9 @@ def _request(scene: Scene) -> Request:
 def _points(
     scene: Scene, ring: GrippedRing, request: Request, statistics: Statistics
 ) -> Iterator[Point[Equilibrium]]:
-    """The points of the path, in the way in which the scene is controlled and solved.
+    """The points of the path, by the control and the solver of the scene.
 
-    What a scene does not need is not imported either.
+    Modules are imported only if the scene needs them.
     """
     every = math.ceil(scene.n_edges / _KEPT) if scene.history else 0
     if scene.solver == "relaxation":
@@ -126,8 +127,8 @@ def _points(
 
 
 @cache
-def _compiled(stability: bool, self_crossings: bool, *, snaps: bool) -> None:
-    """Load or compile the kernels that a path needs, once a process."""
+def _load_kernels(stability: bool, self_crossings: bool, *, snaps: bool) -> None:
+    """Load or compile the kernels that a path needs, once in a process."""
     ring = gripped_ring(circle(), section(1.0, 1.0), 8)
     if snaps:
         from der.rod.relaxation import relax
@@ -141,14 +142,9 @@ def _compiled(stability: bool, self_crossings: bool, *, snaps: bool) -> None:
         gap(x, *nearest_strands(x, x))
 
 
-def _load_kernels(request: Request, *, snaps: bool) -> None:
-    """Make ready what a request needs, before the clock starts."""
-    _compiled(request.stability, request.self_crossings, snaps=snaps)
-
-
 @dataclass(frozen=True)
 class _Found:
-    """What was found of a path, and its error bars, where there are any."""
+    """The points found on a path, and their error bars, if any."""
 
     scene: Scene
     ring: GrippedRing
@@ -156,7 +152,7 @@ class _Found:
     bars: ErrorBars | None = None
 
     def extrapolated(self, request: Request) -> _Found:
-        """The same with error bars, and the points that these have kept."""
+        """The same with error bars; some points are left out, see `error_bars`."""
         from der.analysis.error_bars import error_bars
 
         coarser = meshes(self.scene.n_edges, self.ring.name)[1:]
@@ -172,9 +168,9 @@ class _Found:
         if run.reason is Reason.TURNED_BACK and at_pi is None:
             mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
         if scene.control == "moment":
-            mode = None  # a ring that fell through under its moment tells nothing of its folds
-        keeps = scene.shapes or run.status != "done"  # an unfinished path is what it got to
-        modes = scene.modes and run.status != "interrupted"  # Ctrl-C does not wait for them
+            mode = None  # a ring that snaps under its moment passes its folds unseen
+        keeps = scene.shapes or run.status != "done"  # shapes of an unfinished path are kept
+        modes = scene.modes and run.status != "interrupted"  # they take long: not after Ctrl-C
         entries: dict[str, Any] = {"at_pi": at_pi, "mode": mode}
         if bars is not None:
             entries = {"error": bars.error, "raw": bars.raw, **bars.at_pi(at_pi, mode)}
@@ -196,21 +192,13 @@ class _Found:
         k = next(arrived, None)
         if k is None:
             return None, None
-        one = self.points[k]
-        largest = float(np.abs(raw["moment"]).max())
-        without_load = abs(raw["moment"][k]) <= _NO_MOMENT * largest
-        at_pi = state_at_pi(
-            self.ring, one, self._index_free(one) if without_load and one.index else None
-        )
+        one, gamma, moment = self.points[k], raw["gamma"][: k + 1], raw["moment"][: k + 1]
+        without_load = abs(moment[k]) <= _NO_MOMENT * float(np.abs(raw["moment"]).max())
+        index_free = self._index_free(one) if without_load and one.index else None
+        at_pi = state_at_pi(self.ring, one, index_free)
         before = recorded_points(self.ring, self.points[: k + 1], raw)
-        mode = folding_mode(
-            raw["gamma"][: k + 1],
-            raw["moment"][: k + 1],
-            before,
-            at_pi,
-            three_covered=self.ring.folded(one.solution.state),
-        )
-        return at_pi, mode
+        folded = self.ring.folded(one.solution.state)
+        return at_pi, folding_mode(gamma, moment, before, at_pi, three_covered=folded)
 
     def _index_free(self, one: Point[Equilibrium]) -> int | None:
         """Index of the ring with its grips removed."""
@@ -223,13 +211,10 @@ class _Found:
 
 
 def _numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:
-    return mesh_numerics(scene, ring) | {
-        "gamma_max": scene.gamma_max,
-        "until": scene.until,
-        "control": scene.control,
-        "unload": scene.unload,
-        "solver": scene.solver,
-        "error_bars": scene.error_bars,
+    names = ("gamma_max", "until", "control", "unload", "solver", "error_bars")
+    return {
+        **mesh_numerics(scene, ring),
+        **{name: getattr(scene, name) for name in names},
         "save_at": None if scene.save_at is None else list(scene.save_at),
         "stability": scene.stability,
         "version": release(),

@@ -1,4 +1,4 @@
-"""From the states of a sector to what the record keeps of the full ring, in three dimensions."""
+"""Shapes of the full ring from the states of a sector, in three dimensions."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from der.rod.rod import State
 if TYPE_CHECKING:
     from der.analysis.snap import Landing
 
-STEPS = 90  # of a fall at most: three seconds of film
-# how a mode is mapped by the half-turns about E2 and E3, which map the state onto itself
+STEPS = 90  # of a snap at most: three seconds of animation
+# signs of modes under the half-turns about E2 and E3, which map the state onto itself
 _SIGNS = {"out of phase": (1.0, -1.0), "odd": (-1.0, 1.0)}
 _HALF_TURNS = np.array([[-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 
@@ -33,7 +33,7 @@ def shapes(
     history: bool,
     modes: bool,
 ) -> Shapes:
-    """Vertices and frames at every state, with how the ring falls and its softest modes if asked.
+    """Return vertices and frames at every state, and the snaps and softest modes if asked for.
 
     Parameters
     ----------
@@ -42,20 +42,20 @@ def shapes(
     modes : whether to compute the softest mode of each symmetry class at every state.
     """
     states = [point.solution.state for point in points]
-    x, frames = _whole(ring, states)
+    x, frames = _full_shapes(ring, states)
     falls = _falls(ring, points) if history else []
     softest = _softest(ring, states) if modes else None
     return Shapes(x, frames, tuple(falls), softest, arc_length)
 
 
-def _whole(ring: GrippedRing, states: Sequence[State]) -> tuple[Array, Array]:
+def _full_shapes(ring: GrippedRing, states: Sequence[State]) -> tuple[Array, Array]:
     """Vertices (n, N, 3) and frames (n, N, 3, 3) of the ring."""
     pairs = [ring.shape(state) for state in states]
     return np.array([x for x, _ in pairs]), np.array([frames for _, frames in pairs])
 
 
 def _falls(ring: GrippedRing, points: Sequence[Point[Equilibrium]]) -> list[Fall]:
-    """How the ring falls in the snaps among the points."""
+    """The motions of the snaps among the points."""
     from der.analysis.snap import Landing
 
     return [
@@ -66,20 +66,20 @@ def _falls(ring: GrippedRing, points: Sequence[Point[Equilibrium]]) -> list[Fall
 
 
 def _fall(ring: GrippedRing, after: int, landing: Landing) -> Fall:
-    """The history of a landing in steps of about equal length: it begins and ends slowly."""
-    x, frames = _whole(ring, landing.history)
+    """The history of a landing, resampled in steps of about equal length."""
+    x, frames = _full_shapes(ring, landing.history)
     steps = [float(np.linalg.norm(b - a, axis=1).max()) for a, b in pairwise(x)]
-    way = np.append(0.0, np.cumsum(steps))
-    chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], STEPS)))
+    length = np.append(0.0, np.cumsum(steps))
+    chosen = np.unique(np.searchsorted(length, np.linspace(0.0, length[-1], STEPS)))
     gamma = np.array([state.load for state in landing.history])
     energy = np.array(landing.energies)
     return Fall(after, gamma[chosen], energy[chosen], x[chosen], frames[chosen])
 
 
 def _softest(ring: GrippedRing, states: Sequence[State]) -> Softest:
-    """The softest mode of each symmetry class, and the ring displaced by the softest of all.
+    """The softest mode of each symmetry class, and the displacements of the softest of all.
 
-    Of the two signs of a mode the one nearer to that of the state before is taken.
+    The sign of a mode is the one closer to the mode of the state before.
     """
     eigenvalues = np.empty((len(states), len(ring.classes)))
     u: list[Array] = []
@@ -98,9 +98,9 @@ def displacements(ring: GrippedRing, state: State, label: str, mode: Array) -> A
 
     Notes
     -----
-    A rotation w, in the frame R itself, turns the tangent d3 by (R w) x d3. A half-turn that runs
-    the curve backwards maps edges onto the negatives of edges. The arms of an odd mode move alike:
-    of its pair the one is taken that is even under the half-turn about E3.
+    A rotation w, in the frame R itself, turns the tangent d3 by (R w) x d3. A half-turn that
+    reverses the curve maps edges onto the negatives of edges. Odd modes come in pairs: the one that
+    is even under the half-turn about E3 is used, so both arms move in the same way.
     """
     turn = rotation(state.quat)
     d3 = turn[:, :, 2]

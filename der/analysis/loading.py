@@ -1,28 +1,28 @@
-"""Loading and unloading by what a user controls: the angle, or a dead moment.
+"""Loading and unloading by the angle or by a dead moment.
 
 The ring follows its path of equilibria from minimum to minimum until stability is lost:
 
     angle   at a fold, dgamma/ds = 0, or where the index changes (a branch point)
     moment  at a limit of the moment, dM/ds = 0, or at a branch point
 
-Then it snaps (`snap`), and loading goes on from the state in which the snap ends.
+Then it snaps (`snap`), and loading continues from the end state of the snap.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 
 from der.analysis.request import Request
-from der.analysis.snap import Landing, downhill, snap
+from der.analysis.snap import Snap, downhill
 from der.continuation.step import between
 from der.errors import ContinuationFailed, Reason
-from der.problem import PARAMETER, Increment, Point, Statistics
+from der.problem import PARAMETER, Point, Statistics
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
 
-_PAST = 1e-3  # rad: how far past a branch point the ring is when it snaps
+_PAST = 1e-3  # rad: distance behind a branch point at which the ring snaps
 _LEVEL = 1e-2  # of the rate of the moment where a branch returns to its symmetric path, GJ/a
 
 
@@ -35,21 +35,18 @@ def follow_angle(
     unload: bool = False,
     every: int = 0,
 ) -> Iterator[Point[Equilibrium]]:
-    """Hand out the minima at given gamma, from the flat ring (or ``start``) to ``gamma_max``.
+    """Yield the minima at given gamma, from the flat ring (or ``start``) to ``gamma_max``.
 
-    A snap is handed out as the state before it (a point of kind "fold" or "branch") and a
-    `snap.Landing`. ``unload`` comes back to 0; ``every`` keeps every k-th configuration of snaps.
+    A snap is yielded as the state before it (a point of kind "fold" or "branch") and a
+    `snap.Landing`. ``unload`` returns to 0; ``every`` keeps every k-th configuration of snaps.
 
     Raises
     ------
     ContinuationFailed
-        Where loading cannot go on, after everything that was found has been handed out.
+        If loading cannot continue, after all points found have been yielded.
     """
     loading = _Loading(ring, request, statistics, PARAMETER, every)
-    last = ring.start if start is None else start
-    for one in loading.from_state(last):
-        last = one.solution.state
-        yield one
+    last = yield from loading.from_state(ring.start if start is None else start)
     if unload:
         back = replace(loading, request=replace(request, gamma_max=0.0)).from_state(last)
         next(back)  # the state at which loading has ended
@@ -64,36 +61,34 @@ def follow_moment(
     unload: bool = False,
     every: int = 0,
 ) -> Iterator[Point[Equilibrium]]:
-    """Hand out the minima under a growing dead moment, until gamma arrives at ``gamma_max``.
+    """Yield the minima under a growing dead moment, until gamma reaches ``gamma_max``.
 
-    Past a limit of the moment the ring snaps through, to rest or to the stop at ``gamma_max``.
-    ``unload`` lowers the moment again: the ring leaves the stop when the moment is its own, snaps
-    at once if it is unstable there, else at the limits on the way, and ends at a stop at gamma = 0.
+    Past a limit of the moment the ring snaps, to an equilibrium or to the stop at ``gamma_max``.
+    ``unload`` lowers the moment again. The ring leaves the stop when the dead moment equals its
+    own. If it is unstable there, it snaps at once, else at the limits on its path. It ends at a
+    stop at gamma = 0.
 
     Raises
     ------
     ContinuationFailed
-        Where loading cannot go on, after everything that was found has been handed out.
+        If loading cannot continue, after all points found have been yielded.
     """
     loading = _Loading(ring, request, statistics, "moment", every)
-    last = ring.start
-    for one in loading.from_state(last):
-        last = one.solution.state
-        yield one
+    last = yield from loading.from_state(ring.start)
     if not unload:
         return
     down = replace(loading, request=replace(request, gamma_max=0.0))
     at = down.begun(last)
     if at.slope < 0.0:
-        # M grows as gamma falls: no dead moment holds the ring once it is off the stop
-        landed = down.snapped(at, at.tangent, sense=-1.0, dead_moment=True)
+        # M grows as gamma decreases: no dead moment holds the ring once it has left the stop
+        landed = down.snap(at, -1.0).landing(at.tangent, dead_moment=True)
         yield landed
         down.check_other_classes(landed)
         if landed.solution.parameter == 0.0:
             return
         last = landed.solution.state
     back = down.from_state(last)
-    next(back)  # the state that was handed out last
+    next(back)  # the state that was yielded last
     yield from back
 
 
@@ -121,40 +116,41 @@ class _Loading:
         """1 for loading from a state, -1 for unloading."""
         return 1.0 if self.request.gamma_max >= state.load else -1.0
 
+    def corrected(self, state: State, sense: float, gamma: float | None = None) -> Equilibrium:
+        """The equilibrium near a state, at its own gamma or another."""
+        along, tolerance = self.ring.increment(load=sense), self.request.tolerance
+        at = self.ring.correct(state, along=along, value=gamma, tolerance=tolerance)
+        self.statistics.newton_iterations += at.iterations
+        return at
+
     def begun(self, state: State) -> Equilibrium:
-        """The minimum from which loading starts, its tangent pointing onward.
+        """The minimum from which loading starts, its tangent in the direction of loading.
 
         Raises
         ------
         ContinuationFailed
-            Where there is none.
+            If there is none.
         """
-        at = self.ring.correct(
-            state,
-            along=self.ring.increment(load=self.sense(state)),
-            tolerance=self.request.tolerance,
-        )
-        self.statistics.newton_iterations += at.iterations
+        at = self.corrected(state, self.sense(state))
         place = f"gamma = {state.load:.8f}"
         if not at.converged:
             raise ContinuationFailed(f"{place} is no equilibrium: {at.advice}", Reason.NO_START)
         if at.index != 0:
             raise ContinuationFailed(
-                f"the state at {place} is no minimum: loading cannot go on from it",
-                Reason.NO_START,
+                f"the state at {place} is no minimum: loading cannot start from it", Reason.NO_START
             )
         return at
 
-    def from_state(self, start: State) -> Iterator[Point[Equilibrium]]:
-        """Minima from a state on to the end, with the snaps between them."""
+    def from_state(self, start: State) -> Generator[Point[Equilibrium], None, State]:
+        """Yield the minima from a state to the end, with snaps; return the last state."""
         here: Point[Equilibrium] | None = None
-        while here is None or here.solution.parameter != self.request.gamma_max:
+        while True:
             at = self.begun(start if here is None else here.solution.state)
             sense = self.sense(at.state)
             path = self._path(at.state, sense)
-            regular = first = next(path)
+            regular = point = next(path)
             if here is None:
-                yield first
+                yield point
             for one in path:
                 point = self._named(one)
                 yield point
@@ -162,16 +158,18 @@ class _Loading:
                     break
                 regular = point if not point.kind else regular
             else:
-                return
+                return point.solution.state
             here = self._after(point, self._past(regular, point, path, sense), sense)
             yield here
             self.check_other_classes(here)
+            if here.solution.parameter == self.request.gamma_max:
+                return here.solution.state
 
     def _path(self, start: State, sense: float) -> Iterator[Point[Equilibrium]]:
-        """The path of equilibria from a minimum on.
+        """The path of equilibria from a minimum.
 
-        The index in the sector's own class is always counted, since it says where the ring snaps;
-        it is handed out only where it was asked for.
+        The index in the sector's own class is always counted, because it tells where the ring
+        snaps. The points have it only if it was asked for.
         """
         along = self.ring.increment(load=sense)
         if self.request.stability:
@@ -184,44 +182,26 @@ class _Loading:
     def _named(self, one: Point[Equilibrium]) -> Point[Equilibrium]:
         """A point; a fold of a branch that returns to its symmetric path is a branch point.
 
-        There the moment is stationary, too: the branch goes back on itself, mirrored.
+        There the moment is stationary, too: the branch continues as its own mirror image.
         """
         level = abs(one.solution.moment_rate) < _LEVEL
         if self.hold == PARAMETER and one.kind == "fold" and level:
             return replace(one, kind="branch", details={"symmetry": self.own_class})
         return one
 
-    def snapped(
-        self,
-        before: Equilibrium,
-        mode: Increment,
-        *,
-        sense: float,
-        dead_moment: bool = False,
-        gamma_lost: float | None = None,
-    ) -> Landing:
-        """Where the ring comes to rest that snaps from a state along a mode."""
-        return snap(
-            self.ring,
-            self.request,
-            self.statistics,
-            before,
-            mode,
-            dead_moment=dead_moment,
-            sense=sense,
-            gamma_lost=gamma_lost,
-            every=self.every,
-        )
+    def snap(self, before: Equilibrium, sense: float) -> Snap:
+        """The snap from a state."""
+        return Snap(self.ring, self.request, self.statistics, before, sense, self.every)
 
     def _after(
         self, lost: Point[Equilibrium], past: Callable[[], Equilibrium], sense: float
     ) -> Point[Equilibrium]:
-        """Where the ring goes that has lost its stability at a fold, a limit or a branch point."""
+        """The point at which loading continues after stability is lost."""
         at, symmetry = lost.solution, lost.details.get("symmetry")
         if lost.kind == self.ends_at:
             # the tangent is the softest mode itself, and past the fold is downhill
             dead = self.hold != PARAMETER
-            return self.snapped(at, at.tangent, sense=sense, dead_moment=dead)
+            return self.snap(at, sense).landing(at.tangent, dead_moment=dead)
         if symmetry != self.own_class:
             raise ContinuationFailed(
                 f"the ring loses stability at gamma = {at.parameter:.8f} by a mode ({symmetry})"
@@ -234,7 +214,7 @@ class _Loading:
                 return kept
         before = past()
         mode = downhill(self.ring, before)
-        return self.snapped(before, mode, sense=sense, gamma_lost=at.parameter)
+        return self.snap(before, sense).landing(mode, gamma_lost=at.parameter)
 
     def _past(
         self,
@@ -266,25 +246,20 @@ class _Loading:
         return solved
 
     def _kept(self, at: Equilibrium, sense: float) -> Point[Equilibrium] | None:
-        """The minimum past the end of a branch, on its symmetric path: the ring just goes on.
+        """The minimum past the end of a branch, on its symmetric path: there is no snap.
 
-        None where there is none so close.
+        None: there is none so close.
         """
-        ring, end = self.ring, self.request.gamma_max
-        gamma = at.parameter + sense * _PAST
+        end, gamma = self.request.gamma_max, at.parameter + sense * _PAST
         if (end - gamma) * sense < 0.0:
             gamma = end
-        found = ring.correct(
-            ring.retract(at.state, ring.increment(load=gamma - at.parameter)),
-            along=ring.increment(load=sense),
-            value=gamma,
-            tolerance=self.request.tolerance,
+        found = self.corrected(at.state, sense, gamma)
+        return (
+            self.request.point(self.ring, found) if found.converged and found.index == 0 else None
         )
-        self.statistics.newton_iterations += found.iterations
-        return self.request.point(ring, found) if found.converged and found.index == 0 else None
 
     def check_other_classes(self, landed: Point[Equilibrium]) -> None:
-        """Refuse to go on from a state that is unstable in a class the sector cannot follow."""
+        """Raise an error if a state is unstable in a class that the sector cannot follow."""
         for label, count in zip(self.ring.classes, landed.index or (), strict=False):
             if count:
                 raise ContinuationFailed(

@@ -1,8 +1,9 @@
-"""Loading by dynamic relaxation alone: no Hessian, no factorisation, only forces.
+"""Loading by dynamic relaxation alone, without Hessian and factorisation.
 
-The grips turn in steps, and after each the ring comes to rest from where the last states lead. A
-state that rests elsewhere has snapped, and so has one whose energy is not that of the last and the
-work of the grips in between: a long step reaches other branches that lie close by.
+The grips turn in steps. After each step the ring relaxes from the extrapolation of the last states.
+If the end state is far from the extrapolation, the ring has snapped. It has also snapped if its
+energy is not that of the last state plus the work of the grips: a long step may reach another
+branch close by.
 """
 
 from __future__ import annotations
@@ -13,19 +14,18 @@ from dataclasses import dataclass, replace
 
 from der.analysis.request import EIGHTH, Request
 from der.analysis.secant import CLOSE, ahead, is_work, longer, rested, went_on
-from der.analysis.snap import Landing
+from der.analysis.snap import Landing, snap_details
 from der.errors import ContinuationFailed, Reason
 from der.problem import Point, Statistics
-from der.rod import relaxation
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed, relax
 from der.rod.rod import State
 
-RISE = math.pi / 64.0  # rad, step of a march by dynamic relaxation alone
-RESOLUTION = 1e-6  # rad, of where such a march finds a snap
-_LONGER = 4.0  # times the last step: further ahead, nothing is known of where states lead
-_NARROW = 0.01  # of the way between two states, a parabola through a limit of M
+RISE = math.pi / 64.0  # rad, step of loading by dynamic relaxation alone
+RESOLUTION = 1e-6  # rad, of the place of a snap
+_LONGER = 4.0  # times the last step: longest step for which extrapolation is useful
+_NARROW = 0.01  # of the distance of two states: width of a parabola through a limit of M
 
 
 def follow_relaxed(
@@ -39,18 +39,18 @@ def follow_relaxed(
     tolerance: float = 1e-9,
     every: int = 0,
 ) -> Iterator[Point[Equilibrium]]:
-    """Hand out the minima at given gamma, each by dynamic relaxation: no Hessian anywhere.
+    """Yield the minima at given gamma, each by dynamic relaxation, without any Hessian.
 
-    Gamma goes in steps of ``rise`` [rad] and through every load that is asked for. Limits of the
-    moment are located by parabolas through relaxed states; a state that is not where the last ones
-    lead has snapped, and where is bracketed by bisection to `RESOLUTION` ("gamma_uncertainty" of
-    the landing). Indices are not known, contacts not looked for; tangents and slopes are
-    differences of second order; ``tolerance`` is that of `relaxation.relax`.
+    Gamma grows in steps of ``rise`` [rad], and every load asked for is one of them. Limits of the
+    moment are located by parabolas through relaxed states. A state far from the extrapolation of
+    the last ones has snapped; the gamma of the snap is bracketed by bisection to `RESOLUTION`
+    ("gamma_uncertainty" of the landing). Indices and self-crossings are not computed. Tangents and
+    slopes are differences of second order. ``tolerance`` is that of `relaxation.relax`.
 
     Raises
     ------
     ContinuationFailed
-        Where a state does not come to rest.
+        If the ring does not come to rest.
     """
     walk = _Walk(ring, request, statistics, rise, tolerance, every)
     last = start
@@ -66,7 +66,7 @@ def follow_relaxed(
 
 @dataclass(frozen=True)
 class _Walk:
-    """What the states of one march by relaxation share."""
+    """The settings of one loading by relaxation."""
 
     ring: GrippedRing
     request: Request
@@ -76,47 +76,43 @@ class _Walk:
     every: int
 
     def relaxed(self, start: State, every: int = 0) -> Relaxed:
-        """The state of rest at the load of ``start``.
+        """The relaxed state at the load of ``start``.
 
         Raises
         ------
         ContinuationFailed
-            Where there is none.
+            If there is none.
         """
         found = relax(self.ring, start, tolerance=self.tolerance, every=every)
         self.statistics.force_evaluations += found.evaluations
         if not found.rests:
-            where = f"vertex {found.where} " if found.where >= 0 else ""
-            raise ContinuationFailed(
-                f"at gamma = {start.load:.8f} the ring {where}{relaxation.ADVICE[found.outcome]}",
-                Reason.NOT_AT_REST,
-            )
+            place = f"at gamma = {start.load:.8f} the ring"
+            raise ContinuationFailed(f"{place} {found.advice}", Reason.NOT_AT_REST)
         return found
 
     def loads(self, first: float) -> list[float]:
-        """Loads to relax at, in the order of the march from ``first``."""
-        last = self.request.gamma_max
+        """Loads to relax at, in order from ``first``."""
+        last, most = self.request.gamma_max, self.request.options.max_steps
         low, high = min(first, last), max(first, last)
-        if high - low > self.request.options.max_steps * self.rise:
-            most = self.request.options.max_steps
+        if high - low > most * self.rise:
             raise ContinuationFailed(
                 f"loading would not end within {most} steps", Reason.TOO_MANY_STEPS
             )
-        grid = [k * self.rise for k in range(math.ceil(low / self.rise), int(high / self.rise) + 1)]
-        asked = self.request.targets
-        if asked is None:
-            asked = tuple(
-                k * EIGHTH for k in range(math.ceil(low / EIGHTH), int(high / EIGHTH) + 1)
-            )
-        asked = (*(load for load in (*asked, math.pi) if low <= load <= high), last)
-        # a step of the grid that all but meets a load that is asked for is left out
+
+        def multiples(step: float) -> list[float]:
+            return [k * step for k in range(math.ceil(low / step), int(high / step) + 1)]
+
+        grid, asked = multiples(self.rise), self.request.targets
+        asked = (*(multiples(EIGHTH) if asked is None else asked), math.pi)
+        asked = (*(load for load in asked if low <= load <= high), last)
+        # a step of the grid very close to a load that is asked for is left out
         near = 0.1 * self.rise
         grid = [load for load in grid if min(abs(load - one) for one in asked) > near]
         return sorted({*grid, *asked} - {first}, reverse=last < first)
 
 
 def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Point[Equilibrium]]:
-    """Relaxed states at the loads of a march, with landings where the ring has snapped."""
+    """Relaxed states at the loads, and landings after snaps."""
     ring = walk.ring
     first = walk.relaxed(ring.start if start is None else start.state)
     trail = [rested(ring, [], first)]
@@ -146,29 +142,21 @@ def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Point[Eq
 
 
 def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
-    """The state that a ring has snapped to between the last state of a trail and ``load``."""
+    """The end state of a snap between the last state of a trail and ``load``."""
     ring, before = walk.ring, trail[-1]
     found = walk.relaxed(ahead(ring, trail, load), walk.every)
     rise = load - before.parameter
-    energy = ring.copies * (before.energy + before.moment * rise)
-    details: dict[str, object] = {
-        "gamma_fold": load,
-        "gamma_uncertainty": abs(rise),
-        "energy_before": energy,
-        "energy_after": ring.copies * found.energy,
-        "energy_released": energy - ring.copies * found.energy,
-        "moment_before": ring.arm_moment(before.moment),
-        "moment_after": ring.arm_moment(found.moment),
-        "force_evaluations": found.evaluations,
-    }
+    states = (before.energy + before.moment * rise, before.moment), (found.energy, found.moment)
+    details = snap_details(ring, load, *states, found.evaluations)
+    details["gamma_uncertainty"] = abs(rise)
     energies = tuple(ring.copies * float(e) for e in found.energies)
     at = rested(ring, [], found)
     return Landing(at, "snap", details=details, history=found.history, energies=energies)
 
 
 def _with_limits(walk: _Walk, states: Iterator[Point[Equilibrium]]) -> Iterator[Point[Equilibrium]]:
-    """The points with the limits of the moment put in, each state a step late."""
-    window: list[list[Point[Equilibrium]]] = []  # each with those that are all but the same state
+    """The points together with the limits of the moment, each state one step later."""
+    window: list[list[Point[Equilibrium]]] = []  # three places, each with its equal states
     for one in states:
         if one.kind == "snap":
             for same in window[1:]:
@@ -195,10 +183,10 @@ def _with_limits(walk: _Walk, states: Iterator[Point[Equilibrium]]) -> Iterator[
 
 
 def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Point[Equilibrium]:
-    """The limit of the moment among three relaxed states: bracketed (Brent), then by a parabola.
+    """The limit of the moment among three relaxed states, by Brent's method and then a parabola.
 
-    All of their states lie between the three: a little beyond, there may be a snap. Towards a fold
-    the moment is no parabola, and the first that comes to mind is far off.
+    All states computed lie between the three: just beyond there may be a snap. Near a fold the
+    moment is no parabola, and a wide one would miss the limit.
     """
     from scipy.optimize import minimize_scalar
 

@@ -33,23 +33,20 @@ class Level(NamedTuple):
     solution: Equilibrium
     correction: Direction  # what leads to it from every second frame
     speed: float  # lengths along its own tangent, per length of the path of the finest mesh
-    beyond: float  # how far beyond the plane it lies, along that path
+    beyond: float  # its distance behind the plane, along that path
 
 
 class Restricted(NamedTuple):
-    """What belongs to a state on half and on a quarter of its edges."""
+    """The states on half and on a quarter of the edges that belong to a state."""
 
     half: Level
     quarter: Level
 
 
 def restricted(
-    rings: Sequence[GrippedRing],
-    fine: Equilibrium,
-    near: Restricted | None,
-    tolerance: float,
+    rings: Sequence[GrippedRing], fine: Equilibrium, near: Restricted | None, tolerance: float
 ) -> Restricted | None:
-    """The states of two coarser meshes in the planes normal to the path at a state on the finest.
+    """Return the states of two coarser meshes in the plane normal to the path at a fine state.
 
     Parameters
     ----------
@@ -60,7 +57,7 @@ def restricted(
     Returns
     -------
     Restricted or None
-        None where a level has no such state.
+        None: a level has no such state.
     """
     finest, on_half, on_quarter = rings
     q, _, load = split(finest.supports, fine.tangent)
@@ -78,7 +75,7 @@ def restricted(
 
 def _twice_as_coarse(ring: GrippedRing, finer: Direction, near: Restricted | None) -> Direction:
     """The correction expected on the coarsest mesh, ``ring``; ``finer``: that before it."""
-    # second order: four times that of the finer mesh; and what that was short of nearby
+    # second order: four times that of the finer mesh; plus the error of this estimate nearby
     correction = _coarser(finer, 4.0)
     if near is not None:
         less = _coarser(near.half.correction, 4.0)
@@ -105,8 +102,8 @@ class _Plane:
     ) -> Level | None:
         """The state of ``ring`` in the plane; None: there is none.
 
-        Tried from bare frames, then from the correction ``expected``, which may lead beside the
-        plane and is not worked out before it is needed. ``beyond`` is that of the finer mesh.
+        Newton's method starts from bare frames, then from the correction ``expected``, which is
+        computed only if needed and may lie beside the plane. ``beyond`` is that of the finer mesh.
         """
         own = State(
             np.ascontiguousarray(finer.quat[::2]),
@@ -122,15 +119,15 @@ class _Plane:
         else:
             return None
         away = ring.difference(own, at.state)
-        # corrections are orthogonal one by one, and rotations do not commute: a state lies beside
-        # the plane to the second order of its correction, by as much as its start would have it
+        # each correction is orthogonal, but rotations do not commute: a state lies beside the plane
+        # by the second order of its correction, which depends on its start
         beyond += ring.inner(row, away) / self.advance
         return Level(at, split(ring.supports, away), self.advance / speed, beyond)
 
     def _starts(
         self, ring: GrippedRing, own: State, expected: Callable[[], Direction | None]
     ) -> Iterator[State]:
-        """Where Newton's method starts: bare frames, then these moved by the correction."""
+        """Initial guesses: bare frames, then these moved by the correction."""
         yield own
         correction = expected()
         if correction is not None:

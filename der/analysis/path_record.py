@@ -1,4 +1,4 @@
-"""The record of a path of a gripped ring, made once of its points."""
+"""The record of a path of a gripped ring."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from der.problem import Point, Statistics, total_index
 from der.records.configurations import Shapes
 from der.records.path import AtPi, Path, Timing, counts
 from der.records.path import Point as RecordedPoint
+from der.records.record import SolveTime
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.scene import Scene
@@ -29,7 +30,7 @@ def columns(ring: GrippedRing, points: Sequence[Point[Equilibrium]]) -> dict[str
 
 
 def moment_index(one: Point[Equilibrium], index: int | None) -> int | None:
-    """Index with the moment held: one more where dM/dgamma < 0; unknown where it vanishes."""
+    """Return the index at given moment: one more if dM/dgamma < 0; None where it vanishes."""
     if index is None or one.kind == "limit":
         return None
     return index + (one.solution.slope < 0.0)
@@ -69,7 +70,7 @@ def path_record(
 
     Parameters
     ----------
-    values : of every point, where they are not those of its own mesh.
+    values : of every point; None: those of the points' own mesh.
     entries : further entries of `Path`.
     """
     values = columns(ring, points) if values is None else values
@@ -95,7 +96,7 @@ def path_record(
 def full_shapes(
     scene: Scene, ring: GrippedRing, points: Sequence[Point[Equilibrium]], *, modes: bool
 ) -> Shapes | None:
-    """Return the full ring at every point, if there is any, and what else was asked to be kept."""
+    """Return the full ring at every point, with snaps and modes if asked for; None: no points."""
     if not points:
         return None
     from der.analysis.full_ring import shapes
@@ -105,20 +106,21 @@ def full_shapes(
 
 
 def state_at_pi(ring: GrippedRing, one: Point[Equilibrium], index_free: int | None) -> AtPi:
-    """Return what is recorded of the state at gamma = pi."""
+    """Return the record of the state at gamma = pi."""
     _, moment, energy = ring.values(one.solution)
     index = total_index(ring, one.index)
     slope = ring.arm_moment(one.solution.slope)
     return AtPi(moment, slope, energy, index, moment_index(one, index), index_free)
 
 
+def run_entries(scene: Scene, run: Run) -> dict[str, Any]:
+    """Return the entries of a record that tell of the ring and of the run."""
+    ring = {"ring": scene.ring.to_json(), "section": asdict(scene.section)}
+    return {"status": run.status, "message": run.message, "timing": SolveTime(run.seconds), **ring}
+
+
 def mesh_numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:
     """Return the numerical choices behind an answer, as they are recorded."""
-    return {
-        "n_edges": scene.n_edges,
-        "sector": ring.name,
-        "curvature": scene.curvature,
-        "stretch": scene.stretch,
-        "a_over_t": scene.a_over_t,
-        "tolerance": scene.tolerance,
-    }
+    names = ("curvature", "stretch", "a_over_t", "tolerance")
+    own = {name: getattr(scene, name) for name in names}
+    return {"n_edges": scene.n_edges, "sector": ring.name, **own}

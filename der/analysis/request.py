@@ -1,4 +1,4 @@
-"""What is asked of the path of a gripped ring: where it ends, and what is looked for on it."""
+"""The request of a path of a gripped ring: where it ends, and which events are located."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.rod.rod import State
 from der.scene import Scene
 
-# rad between tangents, where nothing is counted between states: on 280 rings as many folds and
-# limits as with the usual
+# rad between tangents, if nothing is counted between states: the folds and limits of 280 rings were
+# the same as with the default
 LOOSE_TURN = 5.0 / 3.0 * Options.aimed_turn
-EIGHTH = math.pi / 8.0  # states are solved for at its multiples where nothing else was asked
+EIGHTH = math.pi / 8.0  # states are solved for at its multiples if no targets are given
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the path of a gripped ring is asked for.
+    """What is computed on the path of a gripped ring.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Request:
         return self.options.tolerance
 
     def events(self, ring: GrippedRing) -> Events[State]:
-        """Return what continuation has to look for."""
+        """Return the events of the path."""
 
         def stop(at: Solution[State]) -> bool:
             if abs(at.parameter) == self.gamma_max:  # also of a path that has turned back for good
@@ -68,7 +68,7 @@ class Request:
         )
 
     def point(self, ring: GrippedRing, at: Solution[State], **entries: Any) -> Point[Equilibrium]:
-        """Return a solution with its index, where that is wanted."""
+        """Return a point of a solution, with its index if that is wanted."""
         return regular(ring, Events(stability=self.stability), at, **entries)
 
     def follow(
@@ -79,16 +79,9 @@ class Request:
         start: State | None = None,
         along: Increment | None = None,
     ) -> Iterator[Point[Equilibrium]]:
-        """Hand out the points of the path from the flat ring, or another state, on."""
-        begin = ring.start if start is None else start
-        return follow(
-            ring,
-            begin,
-            self.events(ring),
-            along=along,
-            options=self.options,
-            statistics=statistics,
-        )
+        """Yield the points of the path from the flat ring, or another state."""
+        begin, events = ring.start if start is None else start, self.events(ring)
+        return follow(ring, begin, events, along=along, options=self.options, statistics=statistics)
 
 
 def ring_of(scene: Scene, sector: str | None = None, n_edges: int | None = None) -> GrippedRing:

@@ -1,7 +1,8 @@
 """Secant predictor of loading by dynamic relaxation.
 
-Without a Hessian the path is known by differences alone, of up to three states in a row. A state
-continues them if it lies where they lead, and if its energy is theirs and the work in between.
+Without a Hessian, the rates of the path are differences of up to three successive states. A new
+state continues them if it is close to their extrapolation, and if its energy is that of the last
+state plus the work between them.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed
 from der.rod.rod import State
 
-CLOSE = 1e-9  # rad: states nearer than this tell no rates by their differences
+CLOSE = 1e-9  # rad: differences of closer states give no rates
 _MISS = 0.1  # rad, root mean square: a state further from the extrapolation has snapped
-_LOST = 1e-3  # of the work at the largest moment so far: energy beyond that is lost in a snap
-_FAINT = 1e-10  # of the energy, and GJ/a: a loss of less is rounding
-_SHORTER = 0.1  # of the last step: a state so near the last one takes its place
+_LOST = 1e-3  # of the work at the largest moment so far: a larger loss of energy is a snap
+_FAINT = 1e-10  # of the energy, and GJ/a: a smaller loss is rounding
+_SHORTER = 0.1  # of the last step: a state so close to the last one replaces it
 _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 
 
 def ahead(ring: GrippedRing, trail: list[Equilibrium], load: float) -> State:
-    """State at ``load`` extrapolated from the last three, or as many as there are."""
+    """Return the state at ``load`` extrapolated from the last three, or fewer."""
     here = trail[-1]
     rise = load - here.parameter
     rate = ring.increment(load=1.0)
@@ -45,13 +46,13 @@ def _per_load(ring: GrippedRing, at: Equilibrium) -> Increment:
 
 
 def went_on(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> bool:
-    """Whether a state lies where the last ones lead, and not where the ring has snapped to."""
+    """Whether a state is close to the extrapolation of the last ones: the ring has not snapped."""
     miss = ring.difference(ahead(ring, trail, found.state.load), found.state)
     return math.sqrt(ring.inner(miss, miss)) < _MISS
 
 
 def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
-    """Whether a state's energy is that of the last one and the work of the grips in between.
+    """Whether a state's energy is that of the last one plus the work of the grips between them.
 
     The moment is that of the polynomial through the states of the trail and this one; ``largest``
     is the greatest so far.
@@ -62,7 +63,7 @@ def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
         return True
     known = [(at.parameter, at.moment) for at in trail]
     known.append((found.state.load, found.moment))
-    mean = 0.0  # of a cubic, by two points of Gauss's
+    mean = 0.0  # of a cubic, by Gauss's rule with two points
     for place in _GAUSS:
         load = before.parameter + place * rise
         for x, moment in known:
@@ -105,9 +106,9 @@ def rested(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> Equil
 
 
 def longer(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> list[Equilibrium]:
-    """The last states of a trail with a new one, which takes the place of one all but beside it.
+    """Return the last states of a trail with a new one, which replaces one very close to it.
 
-    What the next step is extrapolated from would otherwise be differences of next to nothing.
+    Otherwise the next step would be extrapolated from differences of almost equal states.
     """
     step = abs(found.state.load - trail[-1].parameter)
     if step <= CLOSE:

@@ -1,9 +1,9 @@
 """Self-crossing: an event of a ring's path, where one strand of the ideal curve passes another.
 
-The linking number tells that a strand has passed within a step: it is an integer, and changes. The
-signed gap between the two strands tells where: it is followed to its zero on the step's
-interpolant, corrected to an equilibrium once, and the link is counted on both sides. Where the gap
-does not show the crossing, the link is bisected.
+A change of the linking number, an integer, tells that a strand has passed within a step. The zero
+of the signed gap between the two strands tells where. It is located on the step's interpolant,
+corrected to an equilibrium once, and the link is counted on both sides. If the gap does not show
+the crossing, the link is bisected.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class SelfCrossing:
     _known: list[tuple[Solution[State], int]] = field(default_factory=list)
 
     def located(self, step: Step[State], line: list[Mark], *, ended: bool) -> list[Mark]:
-        """Return the marks of a step with crossings put in where the link changes."""
+        """Return the marks of a step together with the crossings, where the link changes."""
         start, end = step.start, line[-1].point.solution
         if ended and self.ring.overlaps(end.state):
             return line
@@ -67,7 +67,7 @@ class SelfCrossing:
     def _between(
         self, step: Step[State], low: Place, high: Place, *, halve: bool = False
     ) -> list[Mark]:
-        """Where the link changes between two places: at roots of the gap, else by bisection."""
+        """Changes of the link between two places: at roots of the gap, else by bisection."""
         if low[1] == high[1]:
             return []
         if high[0] - low[0] < _CONTACT:
@@ -82,8 +82,7 @@ class SelfCrossing:
         else:
             sides = passed - _SIDE * _CONTACT, passed + _SIDE * _CONTACT
             inside = [(s, self.ring.link(step.at(s).state)) for s in sides if low[0] < s < high[0]]
-        # what changes beside a crossing that was looked at is bisected: it was none, or not the
-        # only one
+        # a change beside the crossing found is bisected: that was no crossing, or not the only one
         return [
             one
             for ends in pairwise([low, *inside, high])
@@ -92,7 +91,7 @@ class SelfCrossing:
 
 
 def _on_its_side(step: Step[State], line: list[Mark], crossing: Mark) -> Mark:
-    """A crossing, put on the other side of a solution at a target where its parameter says so.
+    """A crossing, moved to the other side of a solution at a target if its parameter says so.
 
     The place of a solution at a given parameter is known to second order only.
     """
@@ -106,10 +105,10 @@ def _on_its_side(step: Step[State], line: list[Mark], crossing: Mark) -> Mark:
 
 
 def _lasting(crossings: list[Mark]) -> list[Mark]:
-    """Crossings without those that undo the one before within a very short piece of the path.
+    """Crossings without pairs that cancel within a very short part of the path.
 
-    Close to the folded state the strands lie within the mesh's sagitta of each other: such pairs
-    come and go with N.
+    Close to the folded state the distance of the strands is below the mesh's sagitta: such pairs
+    depend on N.
     """
     kept: list[Mark] = []
     for m in crossings:
@@ -122,14 +121,14 @@ def _lasting(crossings: list[Mark]) -> list[Mark]:
 
 
 def crossing(ring: GrippedRing, step: Step[State], low: float, high: float) -> float | None:
-    """Return a place between two of a step at which a strand passes; None where it is not seen.
+    """Return a place between two of a step at which a strand passes; None: the gap shows none.
 
     The interpolant is corrected to an equilibrium once, close to the crossing.
 
     Raises
     ------
     ContinuationFailed
-        Where Newton's method fails there.
+        If Newton's method fails there.
     """
     shapes = [ring.vertices(step.expected(s)) for s in (low, high)]
     i, k = nearest_strands(*shapes)

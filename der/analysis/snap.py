@@ -1,13 +1,12 @@
-"""What happens past a fold: the ring snaps, and comes to rest somewhere else.
+"""Snaps: the ring loses stability at a fold or branch point and relaxes to another equilibrium.
 
-At a fold the softest mode has lost its stiffness and the energy falls along it like a cubic. A
-kick along it, downhill, starts a dynamic relaxation at that same load (or dead moment); where it
-comes to rest Newton's method polishes; the difference of the two equilibria is what is released.
+At a fold the softest mode has no stiffness, and the energy decreases along it like a cubic. A small
+displacement along it, downhill, starts a dynamic relaxation at the same load (or dead moment).
+Newton's method polishes its end state. The energy released is the difference of the two equilibria.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,27 +14,26 @@ import numpy as np
 from der.analysis.request import Request
 from der.errors import ContinuationFailed, Reason
 from der.problem import PARAMETER, Increment, Point, Statistics
-from der.rod import relaxation
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed, Rest, relax
 from der.rod.rod import State
 
-KICK = 0.05  # rad, root mean square: too short is slow, too long is steep in a stiff ring; what it
-# costs across the valley is spent at once, and along the valley all of this side is downhill
-_TOLERANCE = 1e-6  # GJ/a, of a relaxation before Newton takes over; finer where it cannot
-_OFF = 1e-3  # rad, before a stop, from where a ring moves that does not rest on it
-_PRESSED = 1e-8  # GJ/a: a moment against a stop that is less than this is rounding
-_NEAR = 1e-2  # rad, before a stop: what rests there is looked for by Newton's method at once
-_MEETS = 1e-9  # rad, of a stop: nearer is on it
-_SOFT = 3  # modes nearest to zero that are looked at
+KICK = 0.05  # rad, root mean square: a smaller one makes relaxation slow, a larger one costs energy
+# in a stiff ring; that energy is lost at once, and the motion then goes downhill
+_TOLERANCE = 1e-6  # GJ/a, of a relaxation before Newton's method; finer if that fails
+_OFF = 1e-3  # rad, before a stop: from here a ring moves that does not stay at the stop
+_PRESSED = 1e-8  # GJ/a: a smaller moment against a stop is rounding
+_NEAR = 1e-2  # rad, before a stop: equilibria so close are found by Newton's method at once
+_MEETS = 1e-9  # rad, of a stop: nearer is at the stop
+_SOFT = 3  # modes nearest to zero that are computed
 _RELAXATIONS = 8  # relaxations of one snap at most
 TO_AND_FRO = "its dead moment sends it to its stop and back again"
 
 
 @dataclass(frozen=True)
 class Landing(Point[Equilibrium]):
-    """The state in which a snap ends, and how it got there.
+    """The end state of a snap, and the relaxation to it.
 
     ``details`` hold: gamma_fold, where stability was lost [rad]; energy_before, energy_after and
     energy_released, of the full ring, and moment_before, moment_after, of one arm; and
@@ -47,45 +45,111 @@ class Landing(Point[Equilibrium]):
 
 
 def downhill(ring: GrippedRing, before: Equilibrium) -> Increment:
-    """Return the direction in which the energy of an unstable state falls most, at given load.
+    """Return the direction of steepest decrease of the energy of an unstable state, at given load.
 
     It has unit mass-weighted norm. Next to a branch point of the full ring two modes of opposite
-    stiffness lie near zero: of those nearest, it is the one of the lowest eigenvalue. Of its two
-    signs, that with the lower energy past a kick.
+    stiffness lie near zero: of those nearest, it is the one of the lowest eigenvalue. Its sign is
+    that of the lower energy after a small displacement.
     """
     stiffness, near = ring.softest_modes(before.state, _SOFT)
     mode = near[int(np.argmin(stiffness))]
     norm = float(np.sqrt(np.sum(ring.rod.length[:, None] * mode**2) / ring.rod.length.sum()))
-    ways = [ring.increment(sign * mode / norm) for sign in (1.0, -1.0)]
-    return min(ways, key=lambda way: _kicked(ring, before, way))
+
+    def energy(direction: Increment) -> float:
+        kick = ring.displacement(direction, KICK)
+        return relax(ring, before.state, kick=kick, most=1).energy_start
+
+    return min((ring.increment(sign * mode / norm) for sign in (1.0, -1.0)), key=energy)
 
 
-def _kicked(ring: GrippedRing, before: Equilibrium, mode: Increment) -> float:
-    """Energy after a kick along a mode and onto the conditions."""
-    kick = ring.displacement(mode, KICK)
-    return relax(ring, before.state, kick=kick, most=1).energy_start
+def snap_details(
+    ring: GrippedRing,
+    gamma: float,
+    before: tuple[float, float],
+    after: tuple[float, float],
+    evaluations: int,
+    work: float = 0.0,
+) -> dict[str, object]:
+    """Return the ``details`` of a `Landing`.
+
+    Parameters
+    ----------
+    gamma : where stability was lost [rad].
+    before, after : energy and conjugate moment of the sector in the two states.
+    work : of a dead moment on the sector.
+    """
+    return {
+        "gamma_fold": gamma,
+        "energy_before": ring.copies * before[0],
+        "energy_after": ring.copies * after[0],
+        "energy_released": ring.copies * (before[0] + work - after[0]),
+        "moment_before": ring.arm_moment(before[1]),
+        "moment_after": ring.arm_moment(after[1]),
+        "force_evaluations": evaluations,
+    }
 
 
 @dataclass(frozen=True)
-class _Snap:
-    """What all parts of one snap share."""
+class Snap:
+    """The snap of a ring that has lost its stability.
+
+    Parameters
+    ----------
+    before : the state that loses it.
+    sense : of loading in gamma, to orient the tangent; with a dead moment, towards its stop.
+    every : keep every k-th configuration of the relaxation; 0: none.
+    """
 
     ring: GrippedRing
     request: Request
     statistics: Statistics
     before: Equilibrium
-    sense: float
-    every: int
+    sense: float = 1.0
+    every: int = 0
 
-    def relaxed(self, start: State, moment: float | None, tolerance: float) -> Relaxed:
-        """The rest of the motion from ``start``, under a dead moment or (None) at given load.
+    def landing(
+        self, mode: Increment, *, dead_moment: bool = False, gamma_lost: float | None = None
+    ) -> Landing:
+        """Return the end state of the snap.
+
+        Parameters
+        ----------
+        mode : softest mode before the snap, pointing downhill, of unit mass-weighted norm.
+        dead_moment : whether gamma moves, under the moment of ``before``; it stops at
+            ``request.gamma_max``.
+        gamma_lost : where stability was lost [rad]; None: at ``before``.
 
         Raises
         ------
         ContinuationFailed
-            Where there is none.
+            If the ring does not come to rest, or its end state is no minimum.
         """
-        fall = relax(
+        ring, before = self.ring, self.before
+        kick, moment = ring.displacement(mode, KICK), before.moment if dead_moment else None
+        kick[-1] *= dead_moment
+        relaxations, after = _settled(self, kick, moment)
+        details = snap_details(
+            ring,
+            before.parameter if gamma_lost is None else gamma_lost,
+            (before.energy, before.moment),
+            (after.energy, after.moment),
+            sum(one.evaluations for one in relaxations),
+            work=before.moment * (after.parameter - before.parameter),
+        )
+        index = self.request.point(ring, after).index
+        history = tuple(state for one in relaxations for state in one.history)
+        energies = tuple(ring.copies * float(e) for one in relaxations for e in one.energies)
+        return Landing(after, "snap", index, details=details, history=history, energies=energies)
+
+    def relaxed(self, start: State, moment: float | None, tolerance: float) -> Relaxed:
+        """The relaxation from ``start``, under a dead moment or (None) at given load.
+
+        Raises
+        ------
+        ContinuationFailed
+            If the ring does not come to rest.
+        """
+        found = relax(
             self.ring,
             start,
             moment=moment,
@@ -93,17 +157,13 @@ class _Snap:
             tolerance=tolerance,
             every=self.every,
         )
-        self.statistics.force_evaluations += fall.evaluations
-        if fall.rests or fall.outcome is Rest.AT_STOP:
-            return fall
-        where = f"vertex {fall.where} " if fall.where >= 0 else ""
-        advice = relaxation.ADVICE[fall.outcome]
-        raise ContinuationFailed(
-            f"{self.name} came to no rest: {where}{advice}", Reason.NOT_AT_REST
-        )
+        self.statistics.force_evaluations += found.evaluations
+        if found.rests or found.outcome is Rest.AT_STOP:
+            return found
+        raise ContinuationFailed(f"{self.name} came to no rest: {found.advice}", Reason.NOT_AT_REST)
 
     def polished(self, state: State, moment: float | None) -> Equilibrium:
-        """The equilibrium next to a state that is nearly at rest."""
+        """The equilibrium next to a state that is almost at rest."""
         after = self.ring.correct(
             state,
             along=self.ring.increment(load=self.sense),
@@ -115,25 +175,23 @@ class _Snap:
         return after
 
     def stopped(self, state: State, short: float = 0.0) -> State:
-        """``state`` with its grips turned to the stop or ``short`` of it, nothing else moved."""
-        stop = self.request.gamma_max - self.sense * short
-        turn = self.ring.increment(load=stop - state.load)
-        return self.ring.retract(state, turn).but(load=stop)
+        """``state`` with its grips turned to the stop or ``short`` of it, all else unchanged."""
+        return self.ring.at_load(state, self.request.gamma_max - self.sense * short)
 
     @property
     def stops(self) -> tuple[float, float]:
-        """Loads at which a motion under a dead moment ends: where the march ends, too."""
+        """Loads at which a motion under a dead moment ends: the end of loading."""
         end = self.request.gamma_max
         return (-np.inf, end) if self.sense > 0.0 else (end, np.inf)
 
     def reaches(self, after: Equilibrium) -> bool:
-        """Whether a ring rests at its stop, or all but."""
+        """Whether a state is at the stop or beyond, to rounding."""
         return after.converged and self.sense * (after.parameter - self.request.gamma_max) > -_MEETS
 
     def rests_near(self, after: Equilibrium) -> bool:
-        """Whether a ring rests under its dead moment so shortly before its stop that it is let be.
+        """Whether a state is a minimum under the dead moment just before the stop.
 
-        From a start further off, a motion to that state would run into the stop again.
+        A motion to it from a more distant start would reach the stop again.
         """
         return (
             after.converged
@@ -144,7 +202,7 @@ class _Snap:
         )
 
     def overruns(self, after: Equilibrium, moment: float) -> bool:
-        """Whether a ring held at the stop would come back from it under a dead moment."""
+        """Whether a ring held at the stop would move back from it under a dead moment."""
         return self.sense * (after.moment - moment) > _PRESSED
 
     @property
@@ -153,62 +211,12 @@ class _Snap:
         return f"the snap at gamma = {self.before.parameter:.8f}"
 
 
-def snap(
-    ring: GrippedRing,
-    request: Request,
-    statistics: Statistics,
-    before: Equilibrium,
-    mode: Increment,
-    *,
-    dead_moment: bool = False,
-    sense: float = 1.0,
-    gamma_lost: float | None = None,
-    every: int = 0,
-) -> Landing:
-    """The state in which a ring comes to rest that has lost its stability.
-
-    Parameters
-    ----------
-    before : the state that loses it.
-    mode : softest mode there, pointing downhill, of unit mass-weighted norm.
-    dead_moment : whether gamma moves, under the moment of ``before``; it stops at
-        ``request.gamma_max``.
-    sense : of the march in gamma, to orient the tangent; with a dead moment, towards its stop.
-    gamma_lost : where stability was lost [rad]; None: at ``before``.
-    every : keep every k-th configuration of the relaxation; 0: none.
-
-    Raises
-    ------
-    ContinuationFailed
-        Where the ring does not come to rest, or in a state that is no minimum.
-    """
-    if not dead_moment:
-        mode = np.append(mode[:-1], 0.0)
-    snapping = _Snap(ring, request, statistics, before, sense, every)
-    moment = before.moment if dead_moment else None
-    relaxations, after = _settled(snapping, ring.displacement(mode, KICK), moment)
-    work = before.moment * (after.parameter - before.parameter)
-    details: Mapping[str, object] = {
-        "gamma_fold": before.parameter if gamma_lost is None else gamma_lost,
-        "energy_before": ring.copies * before.energy,
-        "energy_after": ring.copies * after.energy,
-        "energy_released": ring.copies * (before.energy + work - after.energy),
-        "moment_before": ring.arm_moment(before.moment),
-        "moment_after": ring.arm_moment(after.moment),
-        "force_evaluations": sum(one.evaluations for one in relaxations),
-    }
-    found = request.point(ring, after)
-    history = tuple(state for one in relaxations for state in one.history)
-    energies = tuple(ring.copies * float(e) for one in relaxations for e in one.energies)
-    return Landing(after, "snap", found.index, details=details, history=history, energies=energies)
-
-
 def _settled(
-    snapping: _Snap, kick: Increment, moment: float | None
+    snapping: Snap, kick: Increment, moment: float | None
 ) -> tuple[list[Relaxed], Equilibrium]:
-    """Relaxations from a kicked state on, and the minimum that they lead to.
+    """Relaxations from a displaced state, and the minimum at their end.
 
-    A motion that is symmetric may end on a saddle: the ring is kicked off it and falls on.
+    A symmetric motion may end on a saddle: the ring is displaced from it and relaxes further.
     """
     ring = snapping.ring
     relaxations: list[Relaxed] = []
@@ -219,7 +227,7 @@ def _settled(
         relaxations.append(snapping.relaxed(start, moment, tolerance))
         start = relaxations[-1].state
         if relaxations[-1].outcome is Rest.AT_STOP:
-            # gamma stays at its stop, and the rest of the dead moment presses against it
+            # gamma stays at its stop, and part of the dead moment presses against it
             start, moment = snapping.stopped(start), None
             continue
         after = snapping.polished(start, moment)
@@ -228,22 +236,17 @@ def _settled(
             start, moment = snapping.stopped(after.state), None
         elif not after.converged:
             tolerance, reason = 1e-3 * tolerance, after.advice
-        elif (
-            own == 0
-            and moment is None
-            and pressing is not None
-            and snapping.overruns(after, pressing)
-        ):
-            # the stop was only overrun: the ring comes back from it, to where the moment holds it
+        elif own != 0:
+            mode = downhill(ring, after)
+            start, reason = ring.retract(after.state, ring.displacement(mode, KICK)), f"index {own}"
+        elif moment is None and pressing is not None and snapping.overruns(after, pressing):
+            # the ring moves back from the stop, to its equilibrium under the dead moment
             near = snapping.polished(after.state, pressing)
             if snapping.rests_near(near):
                 return relaxations, near
             start, moment = snapping.stopped(after.state, short=_OFF), pressing
-        elif own == 0:
-            return relaxations, after
         else:
-            mode = downhill(ring, after)
-            start, reason = ring.retract(after.state, ring.displacement(mode, KICK)), f"index {own}"
+            return relaxations, after
     raise ContinuationFailed(
         f"{snapping.name} came to rest in no minimum: {reason}", Reason.NO_MINIMUM
     )

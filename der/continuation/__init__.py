@@ -1,4 +1,4 @@
-"""Following the equilibria of any system with a parameter, and the events on the way.
+"""Continuation of the equilibria of any system with a parameter, and events on its path.
 
 May import the seam (problem.py), errors and utils; knows nothing of rods or rings.
 Begin with arclength.py, then step.py and events.py.

@@ -16,7 +16,7 @@ from der.continuation.step import Step
 from der.errors import ContinuationFailed, Reason
 from der.problem import PLANE, Increment, Options, Point, S, Solution, Statistics, System
 
-_STRAIGHT = 0.01  # bulge of a step that is believed although its ends are oriented unequally
+_STRAIGHT = 0.01  # bulge of a step that is accepted although its ends have unequal orientation
 _EASY = 4  # Newton iterations; a step that takes more is followed by a shorter one
 
 
@@ -29,22 +29,22 @@ def follow(
     options: Options | None = None,
     statistics: Statistics | None = None,
 ) -> Iterator[Point[Any]]:
-    """Hand out the points of the path through a state, events in their places.
+    """Yield the points of the path through a state, events included in path order.
 
     Parameters
     ----------
     start : near an equilibrium, at the parameter where the path begins.
-    events : what is looked for, and where the path stops.
-    along : direction in which to set out; default: that of a growing parameter.
+    events : the events to locate, and where the path stops.
+    along : direction of the first step; default: that of a growing parameter.
     options : steps and tolerances.
-    statistics : counted up on the way.
+    statistics : increased in each step.
 
     Raises
     ------
     ValueError
         For limits of an observable that the system does not have.
     ContinuationFailed
-        Where the path cannot be continued, after everything that was found has been handed out.
+        If the path cannot be continued, after all points found have been yielded.
     """
     path = _Path(system, events or Events(), options or Options(), statistics or Statistics())
     yield from path.points(path.begun(start, along))
@@ -52,7 +52,7 @@ def follow(
 
 @dataclass(frozen=True)
 class _Path(Generic[S]):
-    """What the steps of one path share."""
+    """The settings of one path."""
 
     system: System[S]
     events: Events[S]
@@ -74,7 +74,7 @@ class _Path(Generic[S]):
         return at
 
     def points(self, start: Solution[S]) -> Iterator[Point[Any]]:
-        """Points from the start on."""
+        """Points from the start."""
         options = self.options
         here = regular(self.system, self.events, start)
         yield here
@@ -90,7 +90,7 @@ class _Path(Generic[S]):
             try:
                 found, ended = located(self.events, step, here)
             except ContinuationFailed:
-                # both ends are equilibria, but not of one smooth curve: look again from closer
+                # both ends are equilibria, but not of one smooth curve: repeat the step shorter
                 if step.length < 4.0 * options.smallest_step:
                     raise
                 length = 0.25 * step.length
@@ -146,9 +146,9 @@ class _Path(Generic[S]):
 
 
 def _orientation(at: Solution[S]) -> bool:
-    """Orientation of a path: a fold changes the sign of its rate and the index, and so keeps it.
+    """Orientation of a path. A fold changes the sign of the rate and the index, so it keeps it.
 
-    The determinant of the augmented matrix does not vanish along a path but where another
-    branches off (Keller); two solutions of unequal sign otherwise lie on two branches.
+    The determinant of the augmented matrix vanishes along a path only at branch points (Keller).
+    Elsewhere two solutions of unequal sign lie on two branches.
     """
     return ((at.index or 0) % 2 == 0) == (at.parameter_rate > 0.0)

@@ -1,9 +1,9 @@
 """Bifurcations within a step: where the index of one symmetry class changes.
 
-A mode that breaks the symmetry of the path is resisted by its stiffness alone, which vanishes at a
-branch point: a residual r displaces a state along it by r over the stiffness, and by Koiter's law
-the change of the index then shows r^(2/3) away. So a change is sought on a chord between two states
-far enough from it to be clean, and short enough to be the path to rounding.
+The stiffness of a mode that breaks the symmetry of the path vanishes at a branch point. A residual
+r displaces a state along the mode by r over the stiffness, and by Koiter's law the change of the
+index then appears at a distance r^(2/3). So a change is located on a chord between two states. They
+are far enough from it to be accurate, and close enough for the chord to be the path to rounding.
 
 The first class keeps the symmetry of the path. It also loses or gains one by each fold.
 """
@@ -19,10 +19,10 @@ from der.continuation.step import SAME, Step
 from der.problem import Solution, Stability
 
 _CHORD = 2e-7  # of s: a residual of 1e-12 displaces its ends by 1e-5, its sagitta is below 1e-12
-_NEXT = 1e-6  # of s: from here the root of dparameter/dconjugate is looked at; next to a branch
-# point both rates lose digits, their quotient does not
-_AT = 0.1  # of `_NEXT`: how far off that root may be; places err by 1e-9 at most
-_NEARLY = 0.25  # of the softer end: a parabola that comes so close to zero is looked at
+_NEXT = 1e-6  # of s: distance at which dparameter/dconjugate is computed; next to a branch point
+# both rates lose digits, their quotient does not
+_AT = 0.1  # of `_NEXT`: largest distance of its root; places have errors of at most 1e-9
+_NEARLY = 0.25  # of the softer end: the minimum of a parabola below this is computed
 
 Place: TypeAlias = tuple[float, int | None]  # s, and the index of a class there
 Found: TypeAlias = tuple[float, Solution[Any]]
@@ -61,7 +61,7 @@ class Counting:
         return [*self.changes(low, middle), *self.changes(middle, high)]
 
     def _on_chord(self, low: Place, high: Place) -> list[Change]:
-        """The same between two places so near that the path between them is straight."""
+        """The same between two places so close that the path between them is straight."""
         system, step = self.system, self.step
         ends = max(low[0] - _CHORD, 0.0), min(high[0] + _CHORD, step.length)
         a, b = (step.at(s).state for s in ends)
@@ -83,18 +83,18 @@ class Counting:
         first, last = (
             (s, system.count(x, self.symmetry)) for s, x in zip(ends, (a, b), strict=True)
         )
-        # the ends that were found may lie on the wrong side, if by chance they are very near
+        # the ends found may lie on the wrong side if they are very close to the change
         wider = _jump(first, last) == _jump(low, high)
         return search(first, last) if wider else search(low, high)
 
     def between_equals(
         self, low: Place, high: Place, stiffness: tuple[float, float]
     ) -> list[Place]:
-        """A place between two of equal index where the class has another, if there is one.
+        """A place between two of equal index where the index is different, if there is one.
 
-        Two changes of opposite sense within a step show at its ends only by a soft mode
-        (``stiffness`` there). The solution midway is then looked at, and the one at which the
-        parabola through the three stiffnesses is closest to zero.
+        Two changes of opposite sense within a step are visible at its ends only by a soft mode
+        (``stiffness`` there). Then the index is computed midway, and where the parabola through the
+        three stiffnesses is closest to zero.
         """
         if min(map(abs, stiffness)) > self.system.soft:
             return []
@@ -113,10 +113,10 @@ class Counting:
     def beside_folds(
         self, low: tuple[Place, Solution[Any]], last: Place, folds: Sequence[Found]
     ) -> list[Change]:
-        """Changes between two places on either side of folds, but for the folds' own.
+        """Changes between two places on either side of folds, without those of the folds.
 
-        Along a path the stiffness of the mode that a fold makes soft is -(d conjugate/ds)
-        (d parameter/ds) times something positive, to leading order; so the fold's own change is
+        Along a path the stiffness of the mode that is soft at a fold is -(d conjugate/ds)
+        (d parameter/ds) times a positive factor, to leading order; so the change by the fold is
         known.
         """
         first, before = low
@@ -139,7 +139,7 @@ def _jump(low: Place, high: Place) -> int:
 
 
 def _closest(first: float, middle: float, last: float) -> float | None:
-    """Where in (0, 1) the parabola through three values of one sign comes close to zero, if so."""
+    """Where in (0, 1) the parabola through three values of one sign is close to zero, or None."""
     slope, curvature = last - first, 2.0 * (first + last - 2.0 * middle)
     if first * last <= 0.0 or curvature * first <= 0.0 or abs(slope) >= abs(curvature):
         return None
@@ -149,7 +149,7 @@ def _closest(first: float, middle: float, last: float) -> float | None:
 
 
 def is_fold(step: Step[Any], s: float) -> bool:
-    """Whether a change of the index at ``s`` is a fold: dparameter/dconjugate vanishes just there.
+    """Whether a change of the index at ``s`` is a fold: dparameter/dconjugate vanishes there.
 
     Then the null vector w has w . d(residual)/dparameter = d conjugate/ds != 0.
     """
@@ -166,7 +166,7 @@ def is_fold(step: Step[Any], s: float) -> bool:
 def own_changes(
     system: Stability[Any], before: Solution[Any], folds: Sequence[Solution[Any]]
 ) -> list[int]:
-    """By how much each of some folds in a row changes the index; ``before``: a solution before."""
+    """Return the changes of the index by successive folds; ``before``: a solution before them."""
     signs, rising = [], before.parameter_rate > 0.0
     for at in folds:
         signs.append(1 if rising == (at.observables[system.conjugate][1] < 0.0) else -1)
@@ -175,10 +175,9 @@ def own_changes(
 
 
 def merged(system: Stability[Any], step: Step[Any], found: Sequence[Change]) -> list[Change]:
-    """Changes in order, those of one class in one place as one, several classes in their order.
+    """Return the changes in order, those of one class in one place as one.
 
-    The two modes of a pair cross zero together; to rounding the one does before the other, or to
-    and fro.
+    The two modes of a pair cross zero together; rounding may separate them, or repeat a crossing.
     """
     groups: list[list[Change]] = []
     for one in sorted(found, key=lambda one: one.s):

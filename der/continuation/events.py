@@ -1,15 +1,15 @@
 """Events on a continuation step: where a scalar function of the solution changes sign.
 
-After each accepted step the path is searched for what was asked. A zero is located on the step's
-interpolant and corrected to an equilibrium.
+After each accepted step the events are located on the step's interpolant and corrected to
+equilibria.
 
     fold    d(parameter)/ds = 0     the path turns back
     limit   d(observable)/ds = 0    a maximum or minimum of, say, the moment
     target  parameter = value       a solution the user asked for
     branch  the index of one symmetry class changes, and it is not a fold
 
-This module knows nothing of rods. What needs more, as a self-crossing needs the shape of the curve,
-is a `Further` event that the caller supplies.
+This module knows nothing of rods. An event that needs more than the solution, as a self-crossing
+needs the shape of the curve, is a `Further` event that the caller supplies.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from der.continuation.step import SAME, Step
 from der.errors import ContinuationFailed, Reason
 from der.problem import Indices, Point, S, Solution, Stability, System
 
-_FLANK = 1e-3  # of a step: how far from a fold its two sides are looked at
+_FLANK = 1e-3  # of a step: distance from a fold at which its two sides are computed
 
 
 class Mark(NamedTuple):
@@ -41,18 +41,18 @@ class Further(Protocol):
     """An event that is not a function of the solution alone."""
 
     def located(self, step: Step[Any], line: list[Mark], *, ended: bool) -> list[Mark]:
-        """Return the marks of a step with those of this event put in their places."""
+        """Return the marks of a step together with those of this event, in order."""
 
 
 @dataclass(frozen=True)
 class Events(Generic[S]):
-    """What is looked for on a path, and where it stops.
+    """The events of a path, and where it stops.
 
     Parameters
     ----------
     targets : values of the parameter at which solutions are wanted.
-    spacing : further ones at all its multiples; 0: none.
-    stop : whether the path ends at a solution at one of these; None: it never does.
+    spacing : solutions are also wanted at all its multiples; 0: none.
+    stop : whether the path ends at a solution at one of these values; None: it never does.
     limits : observables whose extrema are wanted.
     stability : whether index and branch points are wanted; the system is then a `Stability`.
     further : events that the caller supplies.
@@ -79,7 +79,7 @@ class Events(Generic[S]):
 def regular(
     system: System[S], events: Events[S], solution: Solution[S], **entries: Any
 ) -> Point[Any]:
-    """Return a point with the index of its solution, where that is wanted."""
+    """Return a point with the index of its solution, if that is wanted."""
     if not events.stability:
         return Point(solution, **entries)
     index, stiffness = _stable(system).indices(solution.state)
@@ -87,7 +87,7 @@ def regular(
 
 
 def _stable(system: System[S]) -> Stability[S]:
-    """The system, of which the caller has said that its index can be counted."""
+    """The system, which the caller declares to be a `Stability`."""
     return system  # type: ignore[return-value]
 
 
@@ -108,13 +108,13 @@ def located(events: Events[Any], step: Curve, here: Point[Any]) -> tuple[list[Po
         line.sort(key=lambda m: m.s)
     for event in events.further:
         line = event.located(cast(Step[Any], step), line, ended=ended)
-    if events.stability:  # the index at further events is a sample, too
+    if events.stability:  # the index at further events is used, too
         line = _Stability(step.system, events, cast(Step[Any], step)).located(line)
     return [m.point for m in line[1:]], ended
 
 
 def _folds(step: Curve) -> list[Found]:
-    """Folds of the parameter within a step, also a pair of them between tangents of equal sign."""
+    """Folds of the parameter within a step, even a pair of them between tangents of equal sign."""
 
     def along(at: Solution[Any]) -> tuple[float, float]:
         value, rate = of_parameter(at)
@@ -124,7 +124,7 @@ def _folds(step: Curve) -> list[Found]:
 
 
 def _at_targets(events: Events[Any], step: Curve, folds: list[Found]) -> tuple[list[Mark], bool]:
-    """Solutions at the targets, in order, up to the end of the path if it lies in this step."""
+    """Solutions at the targets, in order, up to the end of the path if it is in this step."""
     cuts = [(0.0, step.start), *folds, (step.length, step.end)]
     marks: list[Mark] = []
     for (s0, a), (s1, b) in pairwise(cuts):
@@ -169,7 +169,7 @@ class _Stability:
     step: Step[Any]
 
     def located(self, line: list[Mark]) -> list[Mark]:
-        """The line with branch points put in, the index of limits, and that beside folds."""
+        """The line with branch points, the index at limits, and that on the sides of folds."""
         line = [
             m._replace(point=self._regular(m.point.solution, kind="limit"))
             if m.point.kind == "limit"
@@ -184,17 +184,13 @@ class _Stability:
         found: list[Change] = []
         for a, b in pairwise(sorted(known, key=lambda m: m.s)):
             found += self._changes(a, b, [m for m in folds if a.s < m.s < b.s])
-        # two folds within a step that its cubic did not show
+        # two folds within a step that its cubic does not show
         hidden = [Mark(one.s, Point(one.at, "fold")) for one in found if one.fold]
-        if len(hidden) % 2:  # of one curve there are two, or none
+        if len(hidden) % 2:  # a smooth curve has two of them, or none
             raise ContinuationFailed(Reason.OTHER_BRANCH.value, Reason.OTHER_BRANCH)
         others = [one for one in found if not one.fold]
         branches = [
-            Mark(
-                m.s,
-                Point(m.at, "branch", details={"symmetry": m.symmetry}),
-                (m.symmetry, m.by),
-            )
+            Mark(m.s, Point(m.at, "branch", details={"symmetry": m.symmetry}), (m.symmetry, m.by))
             for m in merged(self.system, self.step, others)
         ]
         return self._with_sides([*line, *hidden, *branches])
@@ -222,12 +218,12 @@ class _Stability:
         return found
 
     def _returns(self, a: Mark, b: Mark) -> bool:
-        """Whether a branch returns to its path across a fold: its mode just touches zero."""
+        """Whether a branch returns to its path at a fold: its stiffness only touches zero."""
         first, last = (m.point.solution.observables[self.system.conjugate][1] for m in (a, b))
         return first * last <= 0.0
 
     def _beside(self, group: list[Mark], singular: list[Mark], end: float) -> tuple[float, float]:
-        """Places shortly before and after marks, nearer to them than to other singular ones."""
+        """Places just before and after marks, closer to them than to other singular ones."""
         apart = SAME * self.step.length
         low, high = group[0].s, group[-1].s
         last = max((m.s for m in singular if m.s < low - apart), default=0.0)
@@ -248,7 +244,7 @@ class _Stability:
             before, after = (self._regular(at).index for at in places)
             near = groups and groups[0][0].s - group[-1].s < 2.0 * _FLANK * step.length
             if near and None in (after or ()):
-                # the index midway to the next is uncertain: they share what changes over both
+                # the index midway to the next is uncertain: both are treated as one group
                 groups[0] = group + groups[0]
                 continue
             sides = self._shared(places[0], group, before, after)
@@ -257,13 +253,9 @@ class _Stability:
         return [sided.get(id(m), m) for m in line]
 
     def _shared(
-        self,
-        start: Solution[Any],
-        group: list[Mark],
-        before: Indices | None,
-        after: Indices | None,
+        self, start: Solution[Any], group: list[Mark], before: Indices | None, after: Indices | None
     ) -> list[tuple[Indices, Indices] | None]:
-        """Index on the two sides of each of some singular solutions in one place, in a row.
+        """Index on the two sides of each of several singular solutions in one place.
 
         ``start``: the solution before them.
         """

@@ -1,8 +1,8 @@
-"""Extrema within a step: where a scalar function of the solution turns back.
+"""Extrema within a step: where the rate of a scalar function of the solution changes sign.
 
-An extremum of the parameter is a fold, one of an observable a limit point. Two that lie close
-together within one step do not show at its ends; they are looked for where the cubic between two
-solutions is slowest.
+An extremum of the parameter is a fold, one of an observable a limit point. Two that are close
+together within one step are not visible at its ends; they are looked for where the rate of the
+cubic between two solutions is smallest.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from der.continuation.roots import ROOT, least_rate, rate_of_cubic, root_of_rate
 from der.continuation.step import SAME
 from der.problem import Increment, Solution
 
-_AGAINST = 1e-2  # of what its rates let expect: a value that changes so much the other way
-_ASLANT = 0.4  # of a rate at the ends of an interval: by how much that of its cubic may be wrong
-_HALVED = 0.25  # of what it was wrong by: on a part of the interval
+_AGAINST = 1e-2  # of the change expected from its rates: a change so large in the other direction
+_ASLANT = 0.4  # of a rate at the ends of an interval: largest error of the rate of its cubic
+_HALVED = 0.25  # of that error: on a part of the interval
 
 Found: TypeAlias = tuple[float, Solution[Any]]  # a place, and the solution there
 Value: TypeAlias = Callable[[Solution[Any]], tuple[float, float]]  # and its rate along the path
@@ -76,7 +76,7 @@ def of_observable(name: str) -> Value:
 def extrema(
     step: Curve, low: Found, high: Found, value: Value, along: Value | None = None
 ) -> list[Found]:
-    """Return places between two, and their solutions, where a value turns back.
+    """Return places between two, and their solutions, where a value has an extremum.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def extrema(
 
 
 def _extremum(step: Curve, low: Found, high: Found, value: Value) -> Found:
-    """The place between two, and its solution, where a ``value`` turns: its rate changes sign."""
+    """The place between two, and its solution, where the rate of a ``value`` changes sign."""
     u = root_of_rate(*_rate(low, high, value))
     guess = None if u is None else low[0] + u * (high[0] - low[0])
     return step.change(lambda at: value(at)[1], low, high, guess)
@@ -107,15 +107,15 @@ def _rate(low: Found, high: Found, value: Value) -> tuple[float, float, float]:
 def _samples(
     step: Curve, low: Found, high: Found, value: Value, off: float | None = None
 ) -> list[Found]:
-    """Two places, and those between that tell whether the rate of a value changes sign there.
+    """Two places, and places between them that tell whether the rate of a value changes sign.
 
-    Two turns that lie close together show at the ends of an interval only by the cubic between
-    them, whose rate is smallest in the middle. Where that says that they may be there, this place
-    is looked at, and the two halves again.
+    Two extrema close together are visible at the ends of an interval only by the cubic between
+    them, whose rate is smallest in the middle. If its rate allows them, the solution is computed
+    there, and both parts are examined in the same way.
 
     Parameters
     ----------
-    off : by how much the rate of the cubic may be wrong; None: not known.
+    off : largest error of the rate of the cubic; None: not known.
     """
     if high[0] - low[0] < SAME * step.length:
         return [low, high]
@@ -140,10 +140,10 @@ def _samples(
 
 
 def _bisected(step: Curve, places: list[Found], value: Value) -> list[Found]:
-    """Places with one more wherever a value changes against its rates at two of them.
+    """Places, with one more between two if a value changes against its rates at both.
 
-    In between the rate has the other sign, on however short a stretch: by bisection. In a ring
-    stretched all but taut, M leaps so from one end of its range to the other.
+    Between them the rate has the other sign, perhaps on a very short interval, which bisection
+    finds. In a ring stretched almost straight, M changes in this way across its range.
     """
     cut = places[:1]
     for low, high in pairwise(places):

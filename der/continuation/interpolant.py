@@ -1,7 +1,7 @@
-"""The interpolant of a step: a cubic, led through the solutions found within the step.
+"""The interpolant of a step: a cubic, corrected to pass through the solutions within the step.
 
-Increments from the start of a step are flat arrays, so that a path of a few dozen unknowns spends
-its time in arithmetic and not in calls.
+Increments from the start of a step are flat arrays, which keeps the number of calls small on paths
+with few unknowns.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from numba import njit
 
 from der.problem import Array, Increment
 
-_APART = 0.1  # of a step: solutions that lie closer would tell more of rounding than of the path
+_APART = 0.1  # of a step: closer solutions would add rounding errors
 _MOST = 3  # solutions kept to interpolate between
 
 
@@ -61,7 +61,7 @@ def combined(a, x, b, y, c, z):
 
 
 class Interpolant:
-    """The polynomial through a step: a cubic, and what solutions within it were found off that.
+    """The polynomial of a step: a cubic, and the distances of solutions within it from the cubic.
 
     A solution's distance from the cubic is kept over u^2 (1 - u)^2, u = s/length, which vanishes
     with its rate at both ends.
@@ -85,7 +85,7 @@ class Interpolant:
         return self._at(s, len(self._places))
 
     def keep(self, s: float, found: Increment) -> None:
-        """Lead through a solution ``found`` at ``s``, where that says something new."""
+        """Pass through a solution ``found`` at ``s``, unless it is too close to others."""
         u, k = s / self.length, len(self._places)
         if k < _MOST and min(abs(u - place) for place in (0.0, *self._places, 1.0)) >= _APART:
             self._rows[3 + k] = (found - self._at(s, 0)) / (u * (1.0 - u)) ** 2

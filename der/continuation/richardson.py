@@ -30,13 +30,13 @@ def romberg(levels: Array) -> Array:
 
 
 def limit(fine: float, middle: float, coarse: float) -> tuple[float, float]:
-    """Return the limit of three values, and its error: what the last stage has changed."""
+    """Return the limit of three values, and its error: the change by the last stage."""
     _, once, twice = romberg(np.array([fine, middle, coarse])).tolist()
     return twice, abs(twice - once)
 
 
 def limits(levels: Sequence[Mapping[str, float | None]]) -> Extrapolated:
-    """Return `limit` of everything that is known on each of three meshes, the finest first."""
+    """Return `limit` of every value known on each of three meshes, the finest first."""
     found = {}
     for name in levels[0]:
         known = [value for level in levels if (value := level[name]) is not None]

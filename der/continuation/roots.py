@@ -1,10 +1,10 @@
 """Roots of a function of one variable that is expensive to evaluate, and cubics between two values.
 
 Inverse interpolation through the last four values takes half as many evaluations as Brent's method,
-and starts from a guess where one is known. It is used as long as every value is at most half of the
-one before. A root is accepted where the value left is below 1e-12 of the slopes of two chords: the
-chord of the first two values fails for a function that is flat at its root, the last chord for one
-that jumps. Where interpolation gains too little, Brent's method takes over.
+and starts from a guess if one is known. It is used as long as every value is at most half of the
+one before. A root is accepted if its value is below 1e-12 of the slopes of two chords: the chord of
+the first two values fails for a function that is flat at its root, the last chord for one that
+jumps. If interpolation converges too slowly, Brent's method is used.
 
 Everything here is a function of scalars.
 """
@@ -19,7 +19,7 @@ Function = Callable[[float], float]
 
 ROOT = 1e-12  # of s; a fold is a double root of gamma - gamma*, so far below 1e-10 in gamma
 _LAST = 1e-9  # of s: a correction this small leaves the next one, its square, below `ROOT`
-_GAIN = 0.5  # of a value: where more of it is left, Brent's method is better
+_GAIN = 0.5  # of a value: if the next one is larger, Brent's method is better
 _RELATIVE = 8.9e-16  # four times the rounding of a place
 
 

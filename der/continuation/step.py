@@ -1,10 +1,10 @@
 """One accepted step of a path as a curve of equilibria.
 
 Between two neighbouring solutions the path is approximated by a cubic in s, the projection on the
-tangent at the start; the solution at any s is the cubic's value, corrected orthogonally to that
-tangent. Everything sought within a step is a root in s, and what is found is an equilibrium. Its
-distance from the cubic, over the u^2 (1 - u)^2 that vanishes with its rate at both ends, is kept,
-and the next solution in the step starts from the polynomial through all of them.
+tangent at the start. The solution at any s is the cubic's value, corrected orthogonally to that
+tangent. An event within a step is a root in s, and its solution is an equilibrium. The distance of
+the solution from the cubic is kept, over u^2 (1 - u)^2, which vanishes with its rate at both ends.
+The next solution in the step starts from the polynomial through all of them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from der.problem import PARAMETER, PLANE, Increment, S, Solution, Statistics, Sy
 SAME = 1e-6  # of a step: singular solutions that lie closer are one solution
 _ASTRAY = 0.2  # of a step: solutions that lie farther from its curve are on another branch
 _NEAR = 0.1  # of a step: the same for solutions at a given parameter
-_ELSEWHERE = 1e-6  # of s: no rounding leads so far, but a mode without stiffness does
+_ELSEWHERE = 1e-6  # of s: larger than rounding errors, but not than motions of a zero mode
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Step(Generic[S]):
 
     @property
     def bulge(self) -> float:
-        """How far the end lies beside the tangent at the start, over the length."""
+        """Distance of the end from the tangent at the start, over the length."""
         square = self.system.inner(self.jump, self.jump)
         return max(square / self.length**2 - 1.0, 0.0) ** 0.5
 
@@ -80,8 +80,7 @@ class Step(Generic[S]):
         Raises
         ------
         ContinuationFailed
-            Where Newton's method fails, or leads to another branch, although both ends of the step
-            are equilibria.
+            If Newton's method fails, or converges to another branch.
         """
         if s == 0.0:
             return self.start
@@ -98,7 +97,7 @@ class Step(Generic[S]):
         return self._found[s]
 
     def _keep(self, s: float, found: Solution[S]) -> None:
-        """Lead the curve through a solution at ``s``."""
+        """Make the curve pass through a solution at ``s``."""
         self._curve.keep(s, self.system.difference(self.start.state, found.state))
 
     def change(
@@ -110,7 +109,7 @@ class Step(Generic[S]):
     ) -> tuple[float, Solution[S]]:
         """Return the place between two, and its solution, where ``value`` changes its sign.
 
-        ``guess``: a place close to it, where one is known.
+        ``guess``: a place close to it, if one is known.
         """
         known = dict((low, high))
 
@@ -121,8 +120,8 @@ class Step(Generic[S]):
 
         s = smooth_root(of_place, low[0], high[0], guess=guess)
         if s is None:
-            # Beside a branch point a start as good as that of the interpolant leaves a mode without
-            # stiffness where it was. The cubic alone is worse: one more iteration moves it, too.
+            # Close to a branch point the interpolant is so good a guess that Newton's method does
+            # not correct a mode without stiffness. With the cubic alone one more iteration does.
             known = dict((low, high))
             bare = replace(self)
             s = brent(lambda s: of_place(s, bare), low[0], high[0])
@@ -164,16 +163,16 @@ class Step(Generic[S]):
         return self._parameter(s + h) - self._parameter(s - h)
 
     def as_is(self, s: float, state: S) -> Solution[S]:
-        """Return a ``state`` at ``s`` as the equilibrium that it is to the tolerance, not moved.
+        """Return a ``state`` at ``s``, an equilibrium to the tolerance, without moving it.
 
-        At a branch point Newton's method would move it along the mode that has no stiffness. Where
-        rounding leaves more than the tolerance it is tried all the same, but not believed if it
-        leads elsewhere.
+        At a branch point Newton's method would move it along the mode without stiffness. If its
+        residual is above the tolerance, Newton's method is tried; the result is used only if it is
+        close.
 
         Raises
         ------
         ContinuationFailed
-            Where the state is none and Newton's method, tried then, fails.
+            If the state is no equilibrium and Newton's method fails.
         """
         found = self._newton(state, iterations=0)
         if found.converged:
@@ -190,7 +189,7 @@ class Step(Generic[S]):
         Raises
         ------
         ContinuationFailed
-            Where Newton's method fails.
+            If Newton's method fails.
         """
         found = self._newton(guess)
         if not found.converged:
@@ -226,12 +225,7 @@ class Step(Generic[S]):
 
 
 def between(
-    system: System[S],
-    a: Solution[S],
-    b: Solution[S],
-    *,
-    tolerance: float,
-    statistics: Statistics,
+    system: System[S], a: Solution[S], b: Solution[S], *, tolerance: float, statistics: Statistics
 ) -> Step[S]:
     """Return the step between two neighbouring solutions, s measured along the first's tangent."""
     step = Step(system, a, b, 1.0, tolerance, statistics)

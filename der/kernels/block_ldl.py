@@ -4,21 +4,20 @@
     K = [      ]
         [ B' 0 ]   B: m border columns
 
-Blocks are eliminated in order, with complete (Bunch-Parlett) pivoting inside each. That alone is
-not backward stable, since a pivot block can come close to singular while K does not. Such a pivot
-is *delayed*: delta > 0 is added to its diagonal entry u and taken out again by one more border
-column,
+Blocks are eliminated in order, with complete (Bunch-Parlett) pivoting inside each. This alone is
+not backward stable, because a pivot block may be almost singular when K is not. Such a pivot is
+*delayed*: delta > 0 is added to its diagonal entry u and removed again by one more border column,
 
     [ T + delta u u'   u       ]
     [ u'               1/delta ]     the Schur complement over 1/delta is T,
 
-an exact identity that leaves the number of negative eigenvalues as it is; growth stays bounded,
-and the small, fully pivoted border settles the matter. The inertia of K is that of the pivots plus
-that of the border's Schur complement (Haynsworth).
+an exact identity that keeps the number of negative eigenvalues. Growth stays bounded, and the small
+border is factored with full pivoting. The inertia of K is that of the pivots plus that of the
+border's Schur complement (Haynsworth).
 
-Two bands (the arms of a gripped ring) are one T with a zero block between them; what joins them,
-the grip distance, is a border column. A closed ring without grips holds one edge's frame, which
-takes out rigid rotations and cuts the cycle.
+Two bands (the arms of a gripped ring) are one T with a zero block between them; the condition that
+joins them, the grip distance, is a border column. In a closed ring without grips one edge's frame
+is held, which removes rigid rotations and cuts the cycle.
 
 SciPy has banded Cholesky and LU, but no symmetric-indefinite band solver that tells the inertia.
 """

@@ -1,6 +1,6 @@
 """Small dense matrices inside kernels: the pivot blocks and the border of `block_ldl`.
 
-A handful of rows each: a call of LAPACK would cost more than the work.
+They have few rows: a call of LAPACK would take longer than the arithmetic.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ _BUNCH_PARLETT = 0.6403882032022076  # (1 + sqrt 17)/8, Bunch & Parlett 1971
 def invert(A, delay_below, out_delayed):
     """Replace the symmetric ``A`` (m, m) by -A^-1, by sweeps with complete pivoting.
 
-    Pivots are single entries or pairs (Bunch & Parlett), so an indefinite ``A`` is safe. When all
-    that is left is below ``delay_below``, 1 is added to the largest diagonal entry k left, and
-    ``out_delayed[k]`` says so; with ``delay_below`` = 0 nothing is added.
+    Pivots are single entries or pairs (Bunch & Parlett), so ``A`` may be indefinite. If all
+    remaining entries are below ``delay_below``, 1 is added to the largest remaining diagonal entry
+    k, and noted in ``out_delayed[k]``; with ``delay_below`` = 0 nothing is added.
 
     Returns (number of negative pivots, smallest |pivot|); a zero pivot ends with (count, 0).
     """

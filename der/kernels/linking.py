@@ -3,7 +3,7 @@
 Lk = Tw + Wr (Calugareanu, White, Fuller) holds exactly for a polygon when Tw sums the twist that
 parallel transport over each vertex leaves (`strain`) and Wr is the polygon's Gauss integral. Lk is
 an integer at every state without self-crossing and jumps by +-2 when a strand passes through
-another, which is how the passages of the ideal ring are found.
+another, which is how self-crossings of the ideal ring are found.
 """
 
 import numpy as np
@@ -148,7 +148,7 @@ def _quadrilateral(p, q, r, s):
 
 @njit(cache=True)
 def unfold(quat, copies):
-    """Frames (N, 4) of the whole ring from those of a sector, from the first grip on.
+    """Frames (N, 4) of the full ring from those of a sector, from the first grip on.
 
     A quarter (``copies`` = 4) runs from a free point to the second grip, a half (2) from grip to
     grip. Half-turns about E2 and E3 that run the curve backwards carry d2 along and reverse d1 and
@@ -174,7 +174,7 @@ def unfold(quat, copies):
 
 @njit(cache=True)
 def unfold_lengths(length, copies):
-    """Edge lengths (N,) of the whole ring from those (n,) of a sector, which ends in half edges."""
+    """Edge lengths (N,) of the full ring from those (n,) of a sector, which ends in half edges."""
     n = length.shape[0]
     if copies == 1:
         return length.copy()

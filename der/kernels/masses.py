@@ -1,8 +1,8 @@
 """Fictitious masses: the lightest with which a rod moves stably in unit time steps.
 
-Half of the stiffnesses of the vertices on both sides of an edge, times a margin: with
-(a - b)'K(a - b) <= 2 (a'Ka + b'Kb) no frequency exceeds that of the unit step, 2. In their metric
-motion is projected onto the conditions.
+They are half of the stiffnesses of the vertices on both sides of an edge, times a margin. Because
+(a - b)'K(a - b) <= 2 (a'Ka + b'Kb), no frequency is larger than that of the unit step, 2. The
+motion is projected onto the conditions in the metric of these masses.
 """
 
 from __future__ import annotations

@@ -4,16 +4,16 @@ The energy is that of the rod in space (measure "logarithm"), which in a plane i
 
     U = sum_s EI1 (phi_{s+1} - phi_s - rest_s)^2 / (2 cell_s),
 
-its Hessian tridiagonal and the same in every state. What bends a planar problem is where edges
-lead: e_j = length_j (cos phi_j, sin phi_j). Conditions on their weighted sums, two for each row of
+with a tridiagonal Hessian that is the same in every state. The nonlinearity is in the edge vectors,
+e_j = length_j (cos phi_j, sin phi_j). Conditions on their weighted sums, two for each row of
 ``weight`` (the ring is closed; a strut lies between two points), add the forces
 
     L = U + sum_g F_g . sum_j weight_gj e_j,
 
 edge by edge, to the gradient and to the diagonal. Angles are not reduced to a turn: a ring of
-turning number T closes over phi_n = phi_0 + 2 pi T, and the frame of edge 0 is held, which takes
-out the rotation of the plane and cuts the cycle, as in space. Every edge may lengthen with the load
-(a strut) and every natural angle change with it (a way from one ring to another).
+turning number T closes with phi_n = phi_0 + 2 pi T, and the frame of edge 0 is held, which removes
+the rotation in the plane and cuts the cycle, as in space. Every edge may lengthen with the load (a
+strut), and every natural angle may change with it (a path from one ring to another).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _CLOSE = 1e-2  # of the tolerance, for the start and the first iterate: see `equ
 _LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the path
 BENT_TOO_FAR = 8.0 / 9.0 * np.pi  # rad, at a vertex: 160 degrees, as in space
 
-CONVERGED, TOO_MANY, DIVERGED, BENT, SINGULAR = range(5)  # as `equilibrium.Outcome`
+CONVERGED, TOO_MANY, DIVERGED, BENT, SINGULAR = range(5)  # the positions in `errors.REASONS`
 
 
 class PlanarRod(NamedTuple):

@@ -1,8 +1,8 @@
 """Two strands of a closed polygon: where they come nearest, and the signed gap between them.
 
-The link is an integer and can only be bisected, at O(N^2) a time. The gap between two strands, the
-distance of their closest edges with the sign of the edges' triple product, passes through zero
-smoothly where one strand passes through the other.
+The link is an integer and can only be bisected, at a cost of O(N^2) each time. The gap between two
+strands is the distance of their closest edges with the sign of the edges' triple product. It passes
+smoothly through zero where one strand passes through the other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _TURN = 3.0  # rad; an arc has to turn by pi to meet itself (Fenchel)
 
 @njit(cache=True)
 def nearest_strands(x, y):
-    """Vertices (i, k) of two strands that come nearest on the straight way from ``x`` to ``y``.
+    """Vertices (i, k) of two strands that are closest on the straight line from ``x`` to ``y``.
 
     Parameters
     ----------

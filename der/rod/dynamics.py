@@ -1,31 +1,30 @@
-"""Motion in time until a rod rests: overdamped, or with inertia; by implicit steps.
+"""Motion in time until a rod comes to rest, overdamped or with inertia, by implicit steps.
 
     flow    M dq/dt = -grad U - B force                       as in a viscous fluid
     swing   M (d2q/dt2 + damping dq/dt) = -grad U - B force   lightly damped
 
-with each edge's length for its mass: a mode of eigenvalue mu (`stability.softest_modes`) decays as
-exp(-mu t), or has the frequency sqrt(mu). Both are one loop around `implicit_step.step`; they
-differ in a rule. Implicit Euler steps of the flow are stable at any length, and the last ones are
-Newton's method. Steps of the swing are those of the generalised-alpha method on the rotation group
-(Chung and Hulbert 1993; Arnold and Bruels 2007), of second order, which damps what steps do not
-resolve. The conditions on positions are part of each step, so that there is no drift off them. The
-length of a step follows from its error (for the swing: Zienkiewicz and Xie 1991).
+The mass of each edge is its length: a mode of eigenvalue mu (`stability.softest_modes`) decays as
+exp(-mu t), or has the frequency sqrt(mu). Both motions share one loop around `implicit_step.step`
+and differ in the rule of integration. The flow uses implicit Euler steps. They are stable at any
+length, and the last ones are Newton's method. The swing uses the generalised-alpha method on the
+rotation group (Chung and Hulbert 1993; Arnold and Bruels 2007), of second order, which damps
+frequencies that the steps do not resolve. The conditions on positions are part of each step, so
+there is no drift. The length of a step follows from its error (for the swing: Zienkiewicz and Xie
+1991).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
 from der.errors import Reason
 from der.kernels.quaternions import Array
 from der.problem import Increment
-from der.rod.implicit_step import Stepped, on_the_conditions, step, weights
-from der.rod.manifold import Direction
-from der.rod.relaxation import Rest
+from der.rod.implicit_step import Inertia, Stepped, on_the_conditions, step, weights
+from der.rod.relaxation import MotionEnd, Rest
 from der.rod.rod import State
 from der.rod.system import RodSystem
 
@@ -41,52 +40,13 @@ _BETA = 0.25 * (_GAMMA + 0.5) ** 2
 
 
 @dataclass(frozen=True)
-class EndState:
-    """Where a motion ended; where ``outcome`` is not AT_REST or AT_STOP, its last configuration."""
+class EndState(MotionEnd):
+    """End of a motion in time."""
 
-    state: State
-    outcome: Rest
-    where: int  # vertex that is bent too far; -1: none
     steps: int
     factorisations: int  # of rejected steps, too
     time: float  # the unit follows from the masses, see above
-    residual: float  # largest entry of gradient and position gap, GJ/a and a
-    kinetic: float  # kinetic energy at the end, GJ/a; 0 where there is no inertia
-    energy_start: float  # elastic energy of the rod where it starts to move
-    energy: float  # and where it ends
-    moment: float  # dL/dload
-    history: tuple[State, ...]  # every k-th configuration
-    energies: Array  # (len(history),) elastic energies
     times: Array  # (len(history),)
-
-    @property
-    def rests(self) -> bool:
-        """Whether the end is an equilibrium, under given load or moment."""
-        return self.outcome is Rest.AT_REST
-
-
-class _Rule(Protocol):
-    """How rates lead from one configuration to the next."""
-
-    @property
-    def order(self) -> int:
-        """Power of a step's length with which its error grows."""
-
-    def ahead(self, dt: float) -> Array:
-        """Displacement (n b + 1,) expected over a step."""
-
-    def terms(self, dt: float) -> tuple[Array, float]:
-        """``known`` and ``shift`` of the implicit step."""
-
-    def after(self, w: Array, dt: float) -> _Rule:
-        """Return the rates after a step ``w`` that took ``dt``."""
-
-    def error(self, w: Array, dt: float) -> float:
-        """Error of that step, root mean square [rad]."""
-
-    @property
-    def kinetic(self) -> float:
-        """Kinetic energy."""
 
 
 @dataclass(frozen=True)
@@ -95,26 +55,29 @@ class _Overdamped:
 
     mass: Array  # (n b + 1,)
     rate: Array  # of the last step
-    order: int = 2
-    kinetic: float = 0.0
+    order: int = 2  # power of a step's length with which its error grows
+    kinetic: float = 0.0  # kinetic energy
 
     def ahead(self, dt: float) -> Array:
+        """Displacement (n b + 1,) expected over a step."""
         return dt * self.rate
 
     def terms(self, dt: float) -> tuple[Array, float]:
+        """``known`` and ``shift`` of the implicit step."""
         return np.zeros(len(self.mass)), 1.0 / dt
 
-    def after(self, w: Array, dt: float) -> _Rule:
+    def after(self, w: Array, dt: float) -> _Overdamped:
+        """The rates after a step ``w`` that took ``dt``."""
         return _Overdamped(self.mass, w / dt)
 
     def error(self, w: Array, dt: float) -> float:
-        """Half of dt^2 q''."""
+        """Error of that step, root mean square [rad]: half of dt^2 q''."""
         return 0.5 * _rms(self.mass, w - dt * self.rate)
 
 
 @dataclass(frozen=True)
 class _Inertial:
-    """The generalised-alpha step of a damped motion."""
+    """The generalised-alpha step of a damped motion; methods as those of `_Overdamped`."""
 
     mass: Array  # (n b + 1,)
     damping: float
@@ -150,6 +113,9 @@ class _Inertial:
         return 0.5 * float(np.sum(self.mass * self.velocity**2))
 
 
+_Rule: TypeAlias = _Overdamped | _Inertial
+
+
 def flow(
     system: RodSystem,
     start: State,
@@ -162,7 +128,7 @@ def flow(
     most: int = 20_000,
     every: int = 0,
 ) -> EndState:
-    """Return the state in which a rod comes to rest that flows down its energy from ``start``.
+    """Return the end state of the gradient flow of the energy from ``start``.
 
     Parameters
     ----------
@@ -171,19 +137,16 @@ def flow(
     stops : loads at which a motion under dead moment ends.
     tolerance : of the residual, GJ/a.
     accuracy : error allowed to each step, rad, root mean square.
-    most : steps at most.
+    most : largest number of steps.
     every : keep every k-th configuration in `EndState.history`; 0: none.
 
     Notes
     -----
-    Failure to come to rest is a value: see `EndState.outcome` and `relaxation.ADVICE`.
+    Failure to come to rest is a value: see `EndState.outcome` and `EndState.advice`.
     """
+    mass = weights(system)
     motion = _Motion(system, moment, stops, tolerance, accuracy, most, every)
-
-    def rule(mass: Array) -> _Rule:
-        return _Overdamped(mass, np.zeros(len(mass)))
-
-    return motion.from_rest(start, kick, rule, first=1e-4)
+    return motion.from_rest(start, kick, _Overdamped(mass, np.zeros(len(mass))), first=1e-4)
 
 
 def swing(
@@ -200,7 +163,7 @@ def swing(
     every: int = 0,
     duration: float = np.inf,
 ) -> EndState:
-    """Return the state in which a rod comes to rest that swings from ``start``, at first at rest.
+    """Return the end state of the damped motion of a rod from ``start``, where it is at rest.
 
     Parameters
     ----------
@@ -209,18 +172,16 @@ def swing(
     duration : of the motion, at most.
     kick, moment, stops, accuracy, most, every : as of `flow`.
     """
+    mass = weights(system)
+    still = np.zeros(len(mass))
     motion = _Motion(system, moment, stops, tolerance, accuracy, most, every, duration)
-
-    def rule(mass: Array) -> _Rule:
-        still = np.zeros(len(mass))
-        return _Inertial(mass, damping, still, still, still)
-
+    rule = _Inertial(mass, damping, still, still, still)
     return motion.from_rest(start, kick, rule, first=1e-3)
 
 
 @dataclass
 class _Motion:
-    """A motion so far, and what all of its steps share."""
+    """A motion so far, and the settings of its steps."""
 
     system: RodSystem
     moment: float | None
@@ -236,18 +197,13 @@ class _Motion:
     kept: list[tuple[State, float, float]] = field(default_factory=list)
 
     def from_rest(
-        self,
-        start: State,
-        kick: Increment | None,
-        rule: Callable[[Array], _Rule],
-        *,
-        first: float,
+        self, start: State, kick: Increment | None, now: _Rule, *, first: float
     ) -> EndState:
         """The motion from a configuration at rest; ``first``: length of the first step."""
         system = self.system
         start = start if kick is None else system.retract(start, kick)
-        last = begin = on_the_conditions(system.rod, system.supports, start)
-        now, dt = rule(weights(system.rod, system.supports)), first
+        last = begin = on_the_conditions(system, start)
+        dt = first
         if begin.reason is not Reason.CONVERGED:
             return self._ended(begin, begin, _hopeless(begin), 0.0)
         while self.steps < self.most and self.time < self.duration:
@@ -269,30 +225,20 @@ class _Motion:
         return self._ended(begin, last, Rest.TOO_MANY_EVALUATIONS, now.kinetic)
 
     def _step(self, here: State, now: _Rule, dt: float) -> Stepped:
-        known, shift = now.terms(dt)
+        system, ahead = self.system, now.ahead(dt)
         found = step(
-            self.system.rod,
-            self.system.supports,
+            system,
             here,
-            self._displaced(here, now.ahead(dt)),
-            mass=weights(self.system.rod, self.system.supports),
-            known=known,
-            shift=shift,
+            system.retract(here, system.increment(ahead[:-1], float(ahead[-1]))),
+            Inertia(now.mass, *now.terms(dt)),
             moment=self.moment,
             tolerance=0.1 * self.tolerance,
         )
         self.factorisations += found.iterations
         return found
 
-    def _displaced(self, state: State, w: Array) -> State:
-        """``state`` displaced by ``w`` (n b + 1,), its multipliers kept."""
-        supports = self.system.supports
-        q = w[:-1].reshape(supports.free.shape)
-        way = Direction(q, np.zeros(len(supports.target)), float(w[-1]))
-        return self.system.retract(state, way.flat)
-
     def _outcome(self, last: Stepped, kinetic: float) -> Rest | None:
-        """How the motion has ended, if it has."""
+        """How the motion has ended; None: it goes on."""
         if last.residual <= self.tolerance and kinetic <= self.tolerance**2:
             return Rest.AT_REST
         if self.moment is not None and not self.stops[0] < last.state.load < self.stops[1]:
@@ -306,25 +252,14 @@ class _Motion:
     def _ended(
         self, begin: Stepped, last: Stepped, outcome: Rest, kinetic: float, where: int = -1
     ) -> EndState:
-        """The record of the motion."""
+        """The motion's end."""
         if self.every:
             self.kept.append((last.state, last.energy, self.time))
-        return EndState(
-            last.state,
-            outcome,
-            max(where, last.where),
-            self.steps,
-            self.factorisations,
-            self.time,
-            last.residual,
-            kinetic,
-            begin.energy,
-            last.energy,
-            last.moment,
-            tuple(state for state, _, _ in self.kept),
-            np.array([energy for _, energy, _ in self.kept]),
-            np.array([time for _, _, time in self.kept]),
-        )
+        states, energies, times = zip(*self.kept, strict=True) if self.kept else ((), (), ())
+        values = (last.residual, kinetic, begin.energy, last.energy, last.moment)
+        ends = (last.state, outcome, max(where, last.where), *values, states, np.array(energies))
+        counts = (self.steps, self.factorisations)
+        return EndState(*ends, *counts, time=self.time, times=np.array(times))
 
 
 def _rms(mass: Array, w: Array) -> float:

@@ -1,7 +1,7 @@
 """Newton's method for an equilibrium of a supported rod, and the path's tangent there.
 
-One of three conditions closes the equations of equilibrium, in which the load is an unknown: the
-load is given, its conjugate is given, or the correction is orthogonal to a direction
+The load is an unknown, so the equations of equilibrium need one more condition. It is one of three:
+the load is given, its conjugate is given, or the correction is orthogonal to a direction
 (pseudo-arclength). The index and the tangent come from the factors of the last iterate.
 """
 
@@ -16,13 +16,14 @@ from der.errors import REASONS
 from der.kernels.assembly import assemble, hold
 from der.kernels.block_ldl import factor, inertia, solve_refined
 from der.kernels.quaternions import rotation_vector
-from der.problem import Increment, Solution
+from der.problem import Increment, LoadedSolution
 from der.rod.manifold import move
 from der.rod.rod import Rod, State
 from der.rod.supports import Supports
 
-# of the tolerance, for the start and the first iterate: a good start would stop right below it,
-# which a fold magnifies; later iterates may not get there, close to a branch point
+# of the tolerance, for the start and the first iterate: from a good start the residual would end
+# just below the tolerance, and a fold magnifies that; close to a branch point later iterates may
+# not become smaller
 _CLOSE = 1e-2
 _LARGEST_TURN = 1.0  # rad; a correction that turns an edge further has left the path
 _NOTHING = np.zeros(0)  # masses of a rod at rest
@@ -32,26 +33,13 @@ LOAD_HELD, DIRECTION_HELD, MOMENT_HELD = range(3)
 
 
 @dataclass(frozen=True, slots=True)
-class Equilibrium(Solution[State]):
-    """An equilibrium of a rod: observables "moment", conjugate to the load, and "energy".
-
-    Both are of the rod as given (a sector's, not the ring's).
-    """
-
-    @property
-    def moment(self) -> float:
-        """DL/dload, work-conjugate to the load."""
-        return self.observables["moment"][0]
+class Equilibrium(LoadedSolution[State]):
+    """An equilibrium of a rod; moment and energy are those of the sector, not of the full ring."""
 
     @property
     def moment_rate(self) -> float:
         """Rate of the moment along the tangent."""
         return self.observables["moment"][1]
-
-    @property
-    def energy(self) -> float:
-        """Elastic energy."""
-        return self.observables["energy"][0]
 
     @property
     def slope(self) -> float:
@@ -142,24 +130,9 @@ def newton(
         elif control == 2:
             last, last_border, corner = column, system.load_border, system.load_hess + heavy
             z[0] = goal - system.load_grad
-        positive = not moving or negative == n_c
-        solved = (
-            positive
-            and factors.negative >= 0
-            and solve_refined(
-                diag,
-                off,
-                factors,
-                n_c,
-                column,
-                system.load_border,
-                last,
-                last_border,
-                corner,
-                x,
-                y,
-                z,
-            )
+        usable = factors.negative >= 0 and (not moving or negative == n_c)
+        solved = usable and solve_refined(
+            diag, off, factors, n_c, column, system.load_border, last, last_border, corner, x, y, z
         )
         if not solved:
             outcome = 4
@@ -271,12 +244,11 @@ def correct(
     )
     energy, conjugate, rate = values
     outcome, where, taken, residual, negative = ends
-    load_rate = float(tangent[-1])
     return Equilibrium(
         State(*state),
         state[-1],
         tangent,
-        {"moment": (conjugate, rate), "energy": (energy, conjugate * load_rate)},
+        {"moment": (conjugate, rate), "energy": (energy, conjugate * float(tangent[-1]))},
         negative - len(supports.target) if negative >= 0 else None,
         REASONS[outcome],
         f"vertex {where}" if where >= 0 else "",

@@ -1,20 +1,19 @@
-"""The free ring: whether a state is an equilibrium once the grips are removed, and its index.
+"""The free ring: equilibrium and index of a state once the grips are removed.
 
 A twisted ring is mapped onto itself by the half-turn about its twisting axis, which swaps the arms.
 What the arms exert on a grip is therefore symmetric under it: a force along the axis, which the
 free slide makes zero, and a moment about the axis, which is 2 M. So at M = 0 the grips exert
 nothing at all, bending moments included: **every state of a twisted ring with M = 0 is an
-equilibrium of the free ring**, stable or not. (They still guide: in clamped grips fewer motions are
-allowed.)
+equilibrium of the free ring**, stable or not. (Clamped grips still allow fewer motions.)
 
-A ring of uniform natural curvature has one more motion at no cost, where it is not planar: material
-shifts along the curve. On the mesh it costs next to nothing, and as the rigid rotations are taken
-out by one held frame, it is taken out by holding one unknown, that which it moves most. A null
-vector z is not in the hyperplane of such a condition, so the index is that of the other motions.
-A naturally straight rod as stiff one way as the other may also spin about its own tangents at no
-cost (the seventh mode of the isotropic ring), which is taken out likewise.
+A ring of uniform natural curvature that is not planar has one more motion without energy: material
+shifts along the curve. On the mesh its stiffness is almost zero. One held frame removes the rigid
+rotations; one held unknown, the one that the shift moves most, removes the shift. Its null vector z
+does not lie in the hyperplane of this condition, so the index is that of the other motions. A
+naturally straight isotropic rod may also spin about its own tangents without energy (the seventh
+mode of the isotropic ring); this motion is removed in the same way.
 
-Other supports serve as well, such as grips: they leave no motion without cost.
+Other supports, such as grips, are possible too; they leave no motion without energy.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ _PLANAR = 1e-6  # of a shift that is a rigid rotation
 
 @dataclass(frozen=True)
 class FreeRing:
-    """A configuration of the free ring, with the forces that balance it best."""
+    """A configuration of the free ring, with the forces of least residual."""
 
     rod: Rod  # of the full ring
     supports: Supports  # closed, one frame held; or its grips
@@ -53,13 +52,13 @@ class FreeRing:
 
     @property
     def zero_modes(self) -> int:
-        """How many motions cost nothing, beyond rigid ones."""
+        """Number of motions without energy, apart from rigid motions."""
         return len(self._costless())
 
     def pinned(self, least: float = _PLANAR) -> Supports:
-        """The supports with one more unknown held for each motion at no cost.
+        """The supports with one more unknown held for each motion without energy.
 
-        Motions that, but for rigid ones, move nothing by more than ``least`` do not count.
+        A motion does not count if it differs from a rigid one by less than ``least``.
         """
         places = self._costless(least)
         if not places:
@@ -70,7 +69,7 @@ class FreeRing:
         return self.supports._replace(free=free)
 
     def _costless(self, least: float = _PLANAR) -> list[tuple[int, int]]:
-        """For each motion at no cost an unknown that it moves: Gauss's elimination."""
+        """For each motion without energy an unknown that it moves: Gaussian elimination."""
         if np.any(self.supports.turn):
             return []
         places: list[tuple[int, int]] = []
@@ -86,7 +85,7 @@ class FreeRing:
 
     @property
     def system(self) -> RodSystem:
-        """The ring without its motions at no cost."""
+        """The ring, its motions without energy held."""
         return RodSystem(self.rod, self.pinned())
 
     @property
@@ -95,10 +94,8 @@ class FreeRing:
         return RodSystem(self.rod, self.supports)
 
     def index(self) -> int | None:
-        """Return the index, motions at no cost not counted; None: no equilibrium, or singular."""
-        if not self.balanced:
-            return None
-        return self.system.index(self.state)
+        """Return the index, without zero modes; None: no equilibrium, or singular."""
+        return self.system.index(self.state) if self.balanced else None
 
     def polished(self, tolerance: float = 1e-10) -> Equilibrium:
         """Return the equilibrium next to it, by Newton's method."""
@@ -110,8 +107,8 @@ def index_without_grips(
 ) -> int | None:
     """Return the index of a state of ``ring`` once its grips are removed; None: it would move.
 
-    ``full`` is the full ring on the same mesh. An extensible ring first settles: the grips also
-    held the length of their two edges.
+    ``full`` is the full ring on the same mesh. An extensible ring is solved for again first: the
+    grips also held the length of their two edges.
     """
     free = released(ring, full, state)
     if not free.balanced and full.rod.stretching > 0.0:
@@ -131,13 +128,15 @@ def released(ring: GrippedRing, full: GrippedRing, state: State) -> FreeRing:
 def balance(
     rod: Rod, quat: Array, stretch: Array, supports: Supports | None = None, load: float = 0.0
 ) -> FreeRing:
-    """A configuration with the forces that balance it best, in least squares.
+    """Return a configuration with the forces of least residual, by least squares.
 
-    ``held`` are its supports, none but closure if not given, turned to ``load``.
+    Parameters
+    ----------
+    supports : turned to ``load``; None: closure alone.
     """
     supports = free_supports(rod) if supports is None else supports
-    nothing = np.zeros(len(supports.target))
-    system = assemble(rod, supports, quat, stretch, nothing, load)
+    no_force = np.zeros(len(supports.target))
+    system = assemble(rod, supports, quat, stretch, no_force, load)
     free = supports.free.reshape(-1)
     grad = system.grad.reshape(-1)[free]
     border = system.border.reshape(len(free), -1)[free]
@@ -148,10 +147,10 @@ def balance(
 
 
 def shift(rod: Rod, state: State) -> Array:
-    """Rates (n, b) at which frames turn when material shifts along the curve; 0 where that costs.
+    """Rates (n, b) of the frames when material shifts along the curve; 0 if that needs energy.
 
-    It costs where cells or natural strains are not alike. Edge 0 is kept where it is by a rigid
-    rotation, which leaves nothing of it on a planar circle.
+    It does if cells or natural strains differ. A rigid rotation keeps edge 0 in its place; on a
+    planar circle the rates then vanish.
     """
     n, b = rod.n_edges, rod.block
     mode = np.zeros((n, b))
@@ -165,10 +164,10 @@ def shift(rod: Rod, state: State) -> Array:
 
 
 def spin(rod: Rod, state: State) -> Array:
-    """Rates (n, b) at which frames turn when each spins about its tangent; 0 where that costs.
+    """Rates (n, b) of the frames when each spins about its tangent; 0 if that needs energy.
 
-    It does where the natural ring is bent or the section has a stiff and a weak side. Edge 0 is
-    kept where it is by a rigid rotation.
+    It does if the natural rod is curved or the section is not isotropic. A rigid rotation keeps
+    edge 0 in its place.
     """
     mode = np.zeros((rod.n_edges, rod.block))
     stiff = rod.stiffness

@@ -14,7 +14,7 @@ The clamped grips join the arms through the grip distance alone. Hence the modes
 
     in phase      both arms alike: one arm with the slide free
     out of phase  arms opposed: one arm with the slide held
-    odd           under an arm's own half-turn: the slide rests by itself, so they come in pairs
+    odd           under an arm's own half-turn: the slide does not move, so they come in pairs
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class GrippedRing(RodSystem):
         return link(state.quat, self.lengths(state), self.copies)[0]
 
     def turning_number(self, state: State) -> int | None:
-        """How often the tangent of a planar state turns, to 1e-6, < 0 flipped; None: not planar."""
+        """Turning number of a planar state, to 1e-6, < 0 if flipped; None: not planar."""
         x = self.vertices(state)
         quat = state.quat
         # not the strains: some measures of curvature are no angles
@@ -147,13 +147,13 @@ def gripped_ring(
 
     Parameters
     ----------
-    name : "full", "half" (one arm), "quarter" (D2 rings), or "auto", the smallest there is.
+    name : "full", "half" (one arm), "quarter" (D2 rings), or "auto", the smallest possible.
     stretching : EA in GJ/a^2; 0 for an inextensible ring.
 
     Raises
     ------
     ValueError
-        Where ``n_edges`` does not divide, or the ring lacks the symmetry.
+        If ``n_edges`` is not divisible, or the ring lacks the symmetry.
     """
     name = sector_name(ring, name, n_edges)
     joints = sites(ring, n_edges, name)
@@ -197,10 +197,7 @@ def _half(rod: Rod) -> tuple[Supports, Classes]:
     end = rod.n_edges - 1
     one = np.ones(end + 1)
     supports = supported(
-        rod,
-        clamped=(0, end),
-        held=((one, E1, 0.0), (one, E2, 0.0)),
-        turn={0: 1.0, end: -1.0},
+        rod, clamped=(0, end), held=((one, E1, 0.0), (one, E2, 0.0)), turn={0: 1.0, end: -1.0}
     )
     return supports, {
         "in phase": (1, _class(supports.free, one, E1, E2)),
@@ -224,9 +221,9 @@ def _quarter(rod: Rod) -> tuple[Supports, Classes]:
 
 
 def free_supports(rod: Rod) -> Supports:
-    """Supports of a closed rod without grips: it has to stay closed, and nothing else.
+    """Supports of a closed rod without grips: the conditions of closure alone.
 
-    The frame of edge 0 is held, which takes out rigid rotations; translations are no unknowns.
+    The frame of edge 0 is held, which removes rigid rotations; translations are no unknowns.
     """
     one = np.ones(rod.n_edges)
     supports = supported(rod, clamped=(0,), held=((one, E1, 0.0), (one, E2, 0.0), (one, E3, 0.0)))

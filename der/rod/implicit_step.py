@@ -6,24 +6,26 @@ The step from frames q0 looks for q = q0 o exp(w/2) at which
 
 with one mass for each edge, its length: eigenvalues of the softest modes are then squared
 frequencies, or rates of decay. Time integrators differ in ``known`` and ``shift`` alone: 0 and 1/dt
-for the implicit Euler step of a gradient flow, what is left of the past and about 1/dt^2 for one of
-motion. The matrix is that of the equilibrium with shift M on its diagonal.
+for the implicit Euler step of a gradient flow, the terms of earlier steps and about 1/dt^2 for a
+motion with inertia. The matrix is that of the equilibrium with shift M on its diagonal.
 
-The step is taken only where that matrix is positive on the conditions, so that what it finds is the
-minimum of its potential next to q0 and no saddle.
+The step is taken only where that matrix is positive on the conditions. The result is then the
+minimum of the step's potential next to q0, and no saddle.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from der.errors import REASONS, Reason
 from der.kernels.quaternions import Array
 from der.rod.equilibrium import LOAD_HELD, MOMENT_HELD, newton
-from der.rod.rod import Rod, State
-from der.rod.supports import Supports, check_cut
+from der.rod.rod import State
+from der.rod.supports import check_cut
+from der.rod.system import RodSystem
 
 _ITERATIONS = 6  # a step that needs more is too long
 
@@ -42,30 +44,35 @@ class Stepped:
     residual: float  # of the forces without those of inertia: 0 at rest
 
 
-def weights(rod: Rod, supports: Supports) -> Array:
-    """Masses (n b + 1,) of all unknowns, held ones 0; the load's is the rod's whole length."""
-    own = rod.length[:, None] * supports.free
-    return np.append(own.ravel(), rod.length.sum())
+class Inertia(NamedTuple):
+    """Forces of inertia, M (known + shift w); the last entries are the load's."""
+
+    mass: Array  # (n b + 1,) as from `weights`
+    known: Array  # (n b + 1,)
+    shift: float
+
+
+def weights(system: RodSystem) -> Array:
+    """Masses (n b + 1,) of all unknowns, 0 for those held; the load's is the length of the rod."""
+    own = system.rod.length[:, None] * system.supports.free
+    return np.append(own.ravel(), system.rod.length.sum())
 
 
 def step(
-    rod: Rod,
-    supports: Supports,
+    system: RodSystem,
     begin: State,
     guess: State,
+    inertial: Inertia,
     *,
-    mass: Array,
-    known: Array,
-    shift: float,
-    moment: float | None,
+    moment: float | None = None,
     tolerance: float,
 ) -> Stepped:
-    """The implicit step from ``begin``, by Newton's method from ``guess``.
+    """Return the implicit step from ``begin``, by Newton's method from ``guess``.
 
     Parameters
     ----------
-    mass, known : (n b + 1,) as from `weights`; the last entries are the load's.
-    moment : dead moment under which the load moves, too; None: it is given.
+    inertial : forces of inertia or of viscosity.
+    moment : dead moment under which the load moves, too; None: the load is given.
     tolerance : of the residual, GJ/a.
 
     Raises
@@ -78,35 +85,24 @@ def step(
     Failure to converge is a value: see `Stepped.reason`; a matrix that is singular or not positive
     on the conditions is `Reason.SINGULAR`. A shorter step helps.
     """
-    check_cut(rod, supports.free)
-    along = np.zeros(supports.free.size + len(supports.target) + 1)
+    check_cut(system.rod, system.supports.free)
     control = LOAD_HELD if moment is None else MOMENT_HELD
     state, _, values, ends, (w, rest) = newton(
-        *rod, *supports, *guess.but(load=float(guess.load)),
-        control, along, moment or 0.0, tolerance, _ITERATIONS,
-        begin.quat, begin.stretch, float(begin.load), mass, known, shift,
+        *system.rod, *system.supports, *guess.but(load=float(guess.load)),
+        control, system.increment(), moment or 0.0, tolerance, _ITERATIONS,
+        begin.quat, begin.stretch, float(begin.load), *inertial,
     )  # fmt: skip
     energy, conjugate, _ = values
     outcome, where, iterations, _, _ = ends
     return Stepped(State(*state), REASONS[outcome], where, iterations, w, energy, conjugate, rest)
 
 
-def on_the_conditions(rod: Rod, supports: Supports, start: State) -> Stepped:
-    """``start`` moved onto its conditions by the shortest way, in the metric of the masses.
+def on_the_conditions(system: RodSystem, start: State) -> Stepped:
+    """Return the state on the conditions nearest to ``start``, in the metric of the masses.
 
-    Its multipliers stay those of the start: the ones of so short a step are no internal forces.
+    The multipliers stay those of the start: those of so short a step are no internal forces.
     """
-    mass = weights(rod, supports)
-    still = np.zeros(len(mass))
-    found = step(
-        rod,
-        supports,
-        start,
-        start,
-        mass=mass,
-        known=still,
-        shift=1e9,
-        moment=None,
-        tolerance=1e-6,
-    )
+    mass = weights(system)
+    inertial = Inertia(mass, np.zeros(len(mass)), 1e9)
+    found = step(system, start, start, inertial, tolerance=1e-6)
     return replace(found, state=found.state.but(force=start.force))

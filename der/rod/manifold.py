@@ -1,4 +1,4 @@
-"""Increments of a rod's configuration: from one to another, and to a neighbour.
+"""Increments of a rod's configuration: the difference of two, and motion by one.
 
 A configuration is frames, stretches, forces and the load. Frames are rotations, so an increment is
 a rotation vector in each frame; a rate at the end of an increment is turned back to its start.
@@ -18,7 +18,7 @@ from der.rod.supports import Supports
 
 
 class Direction(NamedTuple):
-    """The parts of an increment; views of the flat array where they come from `split`."""
+    """The parts of an increment; those from `split` are views of the flat array."""
 
     q: Array  # (n, b) rotation vectors in the frames, and stretch
     force: Array  # (n_c,)

@@ -1,9 +1,10 @@
-"""A ring in its plane as a discrete rod: rods, states of other rings to start from, shapes.
+"""A planar ring as a discrete rod: the rod, initial guesses and shapes.
 
-States are symmetric about the twisting axis, as every ring is. A planar closed elastica of uniform
-natural curvature is a circle, covered T times, or a figure eight, in any place along the ring; of
-another ring these are what it is led to as the natural curvature is changed into its own, and an
-eight stays where one of its two axes of symmetry lies on the ring's.
+All states are symmetric about the twisting axis, as every ring is. With uniform natural curvature a
+planar closed elastica is a circle, covered T times, or a figure eight at any place along the ring.
+For other rings these are initial guesses: the uniform natural curvature is changed step by step
+into the ring's own. A figure eight then keeps its place if one of its two axes of symmetry is the
+twisting axis.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _UNIFORM = 1e-9  # rad: turnings and cells that are equal
 
 @dataclass(frozen=True, eq=False)
 class PlanarRing:
-    """The mesh of a ring in its plane; its one stiffness, EI1, is 1 here."""
+    """The mesh of a planar ring; EI1 is 1."""
 
     ring: Ring
     places: Array  # (N + 1,) arc lengths of the frames, the first at both ends
@@ -40,37 +41,33 @@ class PlanarRing:
 
     @property
     def uniform(self) -> bool:
-        """Whether all parts of it are alike."""
+        """Whether cells and natural curvature are uniform."""
         return bool(np.ptp(self.rest) < _UNIFORM and np.ptp(self.cell) < _UNIFORM)
 
     @property
     def natural(self) -> Array:
-        """Tangent angles (N,) of the ring cut open and freed of stress, 0 at the first grip."""
+        """Tangent angles (N,) of the stress-free ring, cut open; 0 at the first grip."""
         return np.append(0.0, np.cumsum(self.rest[:-1]))
 
     @property
     def share(self) -> Array:
-        """Arc lengths (N,) of the frames, of the whole."""
+        """Arc lengths (N,) of the frames, over the length of the ring."""
         return self.places[:-1] / self.places[-1]
 
-    def way(self) -> Array:
-        """Weights (N,) of edges whose sum leads from one point of the twisting axis to the other.
+    def chord(self) -> Array:
+        """Weights (N,) of the edges in the chord between the two points on the twisting axis.
 
-        That is from the middle of edge 0 to that of edge N/2.
+        The points are the middles of edges 0 and N/2.
         """
-        half = self.n_edges // 2
-        weight = np.zeros(self.n_edges)
-        weight[1:half] = 1.0
-        weight[0] = 0.5 * self.cell[0] / self.length[0]
-        weight[half] = 0.5 * self.cell[half - 1] / self.length[half]
-        return weight
+        return chord_weights(self.cell, self.length, self.n_edges // 2)
 
     def rod(self, turning: int, rest: Array | None = None, rate: Array | None = None) -> PlanarRod:
-        """The ring left alone, closed after ``turning`` turns.
+        """The free ring with turning number ``turning``.
 
         Parameters
         ----------
-        rest, rate : (N,) natural turning at load 0, and its change per unit of load; its own.
+        rest, rate : (N,) natural turning at load 0, and its change per unit of load. Default: that
+            of the ring, and 0.
         """
         n = self.n_edges
         free = np.ones(n, dtype=bool)
@@ -90,7 +87,7 @@ class PlanarRing:
     def strutted(self) -> PlanarRod:
         """The flat ring with a strut between its points on the axis; the load is its length.
 
-        The strut is one more edge, which nothing bends, and turns as it likes.
+        The strut is one more edge without bending stiffness, free to turn.
         """
         body, n = self.rod(1), self.n_edges
         strut = np.zeros(n + 1)
@@ -98,8 +95,8 @@ class PlanarRing:
         return body._replace(
             length=np.append(body.length, 0.0),
             reach=strut,
-            mass=np.append(body.mass, 0.0),  # how a strut turns is no distance along a path
-            weight=np.array([1.0 - strut, np.append(self.way(), -1.0)]),
+            mass=np.append(body.mass, 0.0),  # rotations of the strut do not count in norms
+            weight=np.array([1.0 - strut, np.append(self.chord(), -1.0)]),
             free=np.append(body.free, True),
         )
 
@@ -110,8 +107,17 @@ class PlanarRing:
         """
         edges = self.length[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
         x = np.cumsum(edges, axis=0) - edges[0] + 0.5 * self.cell[0] / self.length[0] * edges[0]
-        up = float((self.way() @ edges)[1])
+        up = float((self.chord() @ edges)[1])
         return np.asarray(x - [0.0, 0.5 * up])
+
+
+def chord_weights(cell: Array, length: Array, end: int) -> Array:
+    """Weights (n,) of edges whose sum is the chord from the middle of edge 0 to that of ``end``."""
+    weight = np.zeros(len(length))
+    weight[1:end] = 1.0
+    weight[0] = 0.5 * cell[0] / length[0]
+    weight[end] = 0.5 * cell[end - 1] / length[end]
+    return weight
 
 
 def planar_ring(scene: Scene, n_edges: int | None = None) -> PlanarRing:
@@ -125,25 +131,30 @@ def planar_ring(scene: Scene, n_edges: int | None = None) -> PlanarRing:
 
 
 def covered(mesh: PlanarRing, turning: int) -> Array:
-    """Tangent angles (N,) of the ring bent evenly until it turns ``turning`` times."""
+    """Tangent angles (N,) of the ring bent uniformly until its turning number is ``turning``."""
     more = 2.0 * math.pi * turning - float(mesh.rest.sum())
     return mesh.natural + more * mesh.share
 
 
 def eight(mesh: PlanarRing, shift: float) -> Array:
-    """Tangent angles (N,) of a figure eight; ``shift`` in turns, 0 and 1/4 are symmetric.
+    """Tangent angles (N,) of a figure eight; ``shift`` in turns, 0 and 1/4 are symmetric."""
+    theta = eight_angles(np.append(shift, shift + mesh.share))
+    return theta[1:] - theta[0]
+
+
+def eight_angles(places: Array) -> Array:
+    """Tangent angles (n,) of a figure eight at arc lengths over its length.
 
     Notes
     -----
-    sin(theta/2) = k sn(u), one period of 4 K(k) to the length, 2 E(k) = K(k) (Love 1927, 263);
-    at u = 0 the strands cross, at u = K they are bent most.
+    The tangent angle theta of an inflectional elastica is sin(theta/2) = k sn(u), one period of
+    4 K(k) to the length; it closes where 2 E(k) = K(k) (Love 1927, 263). At u = 0 the strands
+    cross, at u = K the curvature is largest.
     """
     from scipy.special import ellipe, ellipj, ellipk
 
-    m = find_root(lambda m: 2.0 * ellipe(m) - ellipk(m), 0.5, 0.95)
-    places = np.append(shift, shift + mesh.share)
-    theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * places, m)[0])
-    return np.asarray(theta[1:] - theta[0])
+    m = find_root(lambda m: float(2.0 * ellipe(m) - ellipk(m)), 0.5, 0.95)
+    return np.asarray(2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * places, m)[0]))
 
 
 def shifted(mesh: PlanarRing, phi: Array) -> Array:

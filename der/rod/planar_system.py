@@ -1,4 +1,4 @@
-"""A rod that stays in a plane as a system that can be followed; see `kernels.planar`."""
+"""The planar rod as a system for continuation; see `kernels.planar`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from der.errors import REASONS
 from der.kernels.planar import Array, PlanarRod, correct_planar, negative_planar
-from der.problem import PARAMETER, PLANE, Increment, Indices, Solution
+from der.problem import PARAMETER, PLANE, Increment, Indices, LoadedSolution
 
 
 class PlanarConfiguration(NamedTuple):
@@ -23,8 +23,8 @@ class PlanarConfiguration(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class PlanarEquilibrium(Solution[PlanarConfiguration]):
-    """An equilibrium of a planar rod: observables "moment", conjugate to the load, and "energy"."""
+class PlanarEquilibrium(LoadedSolution[PlanarConfiguration]):
+    """An equilibrium of a planar rod, in units of EI1."""
 
     @property
     def phi(self) -> Array:
@@ -36,16 +36,6 @@ class PlanarEquilibrium(Solution[PlanarConfiguration]):
         """Multipliers (m,) of the position conditions."""
         return self.state.force
 
-    @property
-    def moment(self) -> float:
-        """DL/dload."""
-        return self.observables["moment"][0]
-
-    @property
-    def energy(self) -> float:
-        """Elastic energy; EI1 is 1."""
-        return self.observables["energy"][0]
-
 
 @dataclass(frozen=True, eq=False)
 class PlanarRodSystem:
@@ -53,7 +43,7 @@ class PlanarRodSystem:
 
     Parameters
     ----------
-    pin : (n,) direction in which nothing is corrected: a motion that costs nothing.
+    pin : (n,) direction of a motion without energy, along which nothing is corrected.
     """
 
     rod: PlanarRod
@@ -100,7 +90,7 @@ class PlanarRodSystem:
         return self._equilibrium(found, pin.shape[2])
 
     def _rod_at(self, load: float) -> PlanarRod:
-        """The rod at a load; a strut of no length has no direction that could change."""
+        """The rod at a load; the direction of a strut of length 0 is held."""
         if load != 0.0 or not self.rod.reach.any():
             return self.rod
         return self.rod._replace(free=self.rod.free & (self.rod.reach == 0.0))
@@ -130,8 +120,8 @@ class PlanarRodSystem:
     def difference(self, a: PlanarConfiguration, b: PlanarConfiguration) -> Increment:
         """Return the increment that leads from one configuration to another.
 
-        Nothing corrects rounding along the pin, and extrapolation from step to step would make it
-        grow: it is taken out.
+        The part along the pin is removed: nothing corrects its rounding, which extrapolation from
+        step to step would make grow.
         """
         turn = b.phi - a.phi
         if self.pin is not None:
@@ -158,7 +148,7 @@ class PlanarRodSystem:
         return self.negative(state, 0.0) - len(state.force)
 
     def negative(self, state: PlanarConfiguration, shift: float) -> int:
-        """Return those of the bordered Hessian with ``shift`` added to every stiffness."""
+        """Return the negative eigenvalues of the bordered Hessian, its stiffnesses shifted."""
         return int(negative_planar(self._rod_at(state.load), *state, shift))
 
 

@@ -1,18 +1,19 @@
 """Dynamic relaxation: a rod moves, is stopped at every peak of kinetic energy, and comes to rest.
 
 Fictitious masses turn the search for a minimum of the energy into motion in unit time steps
-(Day 1965; Barnes 1999; Papadrakakis 1981). No matrix of the whole rod is formed or factored: a step
-needs the gradient, one block of mass an edge, and an m x m system for m <= 5 position conditions.
+(Day 1965; Barnes 1999; Papadrakakis 1981). The full matrix of the rod is neither formed nor
+factored: a step needs the gradient, one mass block for each edge, and an m x m system for m <= 5
+position conditions.
 
-    masses      as light as the unit step allows (`masses`), times a margin; a rod that gains
-                energy all the same gets heavier
-    conditions  constraint forces keep accelerations on them, and the velocity of each step takes
-                back, in the metric of the masses, what the last one strayed
-    damping     kinetic: where the kinetic energy has passed a peak, the rod goes back to the middle
-                of the last step and starts again from rest (Barnes 1999)
+    masses      the lightest that the unit step allows (`masses`), times a margin; if the rod gains
+                energy nevertheless, they are increased
+    conditions  constraint forces keep the accelerations on them; the velocity of each step removes
+                the error of the last step, in the metric of the masses
+    damping     kinetic: after a peak of the kinetic energy the rod goes back to the middle of the
+                last step and starts again from rest (Barnes 1999)
 
-In the rotations of frames bending and twisting are of second order in arc length, so the number of
-steps grows like the number of edges; in positions it would grow like its square.
+Bending and twisting are of second order in arc length when the unknowns are rotations of frames,
+so the number of steps grows like the number of edges. With positions it would grow like its square.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ _HEAVIER = 1.5  # factor on the masses of a rod that has gained energy
 _GAIN = 1e-9  # of the energy: less is rounding and the second order of the conditions
 _CLOSED = 1e-6  # a; a larger gap is closed before the motion starts
 _PROJECTIONS = 20
-_SLOTS = 2048  # of the album: a longer film is thinned out
+_SLOTS = 2048  # of the album: of a longer motion every second configuration is removed
 
 
 class Rest(IntEnum):
-    """How a relaxation ended."""
+    """How a motion ended."""
 
     AT_REST = 0
     TOO_MANY_EVALUATIONS = 1
@@ -60,7 +61,7 @@ ADVICE = {
 
 
 class Aim(NamedTuple):
-    """What a relaxation is after, and what it may cost."""
+    """Load, stopping conditions and cost limit of a relaxation."""
 
     frees_load: bool  # whether the load moves, under a dead moment
     moment: float  # that moment, dL/dload
@@ -72,7 +73,7 @@ class Aim(NamedTuple):
 
 
 class Album(NamedTuple):
-    """Every k-th configuration of a relaxation, of a long one fewer; kernels write to it."""
+    """Every k-th configuration of a relaxation, fewer of a long one; kernels write to it."""
 
     quat: Array  # (slots, n, 4)
     stretch: Array  # (slots, n)
@@ -80,42 +81,39 @@ class Album(NamedTuple):
     energy: Array  # (slots,)
 
 
-class Ended(NamedTuple):
-    """What the kernel returns."""
-
-    outcome: int
-    where: int
-    evaluations: int
-    restarts: int
-    residual: float
-    kinetic: float
-    energy_start: float
-    energy: float
-    moment: float
-    kept: int
-
-
-@dataclass(frozen=True, slots=True)
-class Relaxed:
-    """A relaxation; where ``outcome`` is not AT_REST (or AT_STOP), its last configuration."""
+@dataclass(frozen=True)
+class MotionEnd:
+    """End of a motion: its last configuration, where ``outcome`` is not AT_REST or AT_STOP."""
 
     state: State
     outcome: Rest
     where: int  # vertex that is bent too far; -1: none
-    evaluations: int  # of the gradient
-    restarts: int  # from rest, at peaks of the kinetic energy
     residual: float  # largest entry of gradient and position gap, GJ/a and a
-    kinetic: float  # kinetic energy at the end, GJ/a
-    energy_start: float  # elastic energy of the rod as given, where it starts to move
-    energy: float  # and where it ends
+    kinetic: float  # kinetic energy at the end, GJ/a; 0 where there is no inertia
+    energy_start: float  # elastic energy at the start of the motion
+    energy: float  # and at its end
     moment: float  # dL/dload
-    history: tuple[State, ...]  # every k-th configuration, without multipliers
+    history: tuple[State, ...]  # every k-th configuration
     energies: Array  # (len(history),) elastic energies
 
     @property
     def rests(self) -> bool:
         """Whether the end is an equilibrium, under given load or moment."""
         return self.outcome is Rest.AT_REST
+
+    @property
+    def advice(self) -> str:
+        """How the motion ended, as part of a sentence."""
+        where = f"vertex {self.where} " if self.where >= 0 else ""
+        return f"{where}{ADVICE[self.outcome]}"
+
+
+@dataclass(frozen=True)
+class Relaxed(MotionEnd):
+    """End of a dynamic relaxation; the states of its history have no multipliers."""
+
+    evaluations: int  # of the gradient
+    restarts: int  # from rest, at peaks of the kinetic energy
 
 
 @njit(cache=True)
@@ -152,7 +150,7 @@ def _balance(supports, masses, aim, pull):
 def _accelerate(pull, masses, moment, time, motion):
     """Kinetic energy after ``time`` steps of acceleration, with the velocity on the conditions.
 
-    The velocity's part across the conditions is what takes back their gap in one step.
+    The part of the velocity across the conditions closes their gap in one step.
     """
     n, b, m = pull.border.shape
     velocity, rate = motion.velocity, motion.rate
@@ -264,7 +262,7 @@ def _thin(out_album):
 
 @njit(cache=True)
 def _potential(energy, aim, motion, pull):
-    """What a motion spends: energy less the work of dead loads; gaps count to first order."""
+    """Potential energy: elastic, less the work of dead loads; gaps count to first order."""
     potential = energy - pull.work[0] - aim.moment * motion.load[0]
     for k in range(pull.gap.shape[0]):
         potential += pull.force[k] * pull.gap[k]
@@ -307,41 +305,23 @@ def _relax(rod, supports, aim, motion, pull, masses, album):
         restarts += 1
         heaviness *= _HEAVIER if gained else 1.0
         weigh(rod, supports, motion, heaviness, aim.frees_load, masses)
-    moment = pull.load_grad[0]
-    return Ended(
-        outcome, bent_too_far, count, restarts, residual, kinetic, start, energy, moment, kept
-    )
+    values = (residual, kinetic, start, energy, pull.load_grad[0])
+    return (outcome, bent_too_far), values, (count, restarts), kept
 
 
 def _at_rest(supports: Supports, state: State) -> Motion:
-    """A rod that is about to move."""
-    n, b = supports.free.shape
-    load = np.array([float(state.load)])
-    return Motion(
-        state.quat.copy(),
-        state.stretch.copy(),
-        load,
-        np.zeros((n, b)),
-        np.zeros(1),
-        np.zeros((n, b)),
-        np.zeros(1),
-    )
+    """A motion that starts from rest."""
+    shape, load = supports.free.shape, np.array([float(state.load)])
+    velocities = (np.zeros(size) for size in (shape, 1, shape, 1))
+    return Motion(state.quat.copy(), state.stretch.copy(), load, *velocities)
 
 
 def _no_pull(supports: Supports) -> Pull:
-    """Room for the forces on a rod."""
+    """Arrays for the forces on a rod."""
     (n, b), m = supports.free.shape, len(supports.target)
-    return Pull(
-        grad=np.zeros((n, b)),
-        load_grad=np.zeros(1),
-        gap=np.zeros(m),
-        border=np.zeros((n, b, m)),
-        load_border=np.zeros(m),
-        lever=np.zeros((n, b, m)),
-        metric=np.zeros((m, m)),
-        force=np.zeros(m),
-        work=np.zeros(1),
-    )
+    conditions = {"gap": m, "border": (n, b, m), "load_border": m, "lever": (n, b, m)}
+    sizes = {"grad": (n, b), "load_grad": 1, **conditions, "metric": (m, m), "force": m, "work": 1}
+    return Pull(**{name: np.zeros(size) for name, size in sizes.items()})
 
 
 def relax(
@@ -363,18 +343,18 @@ def relax(
     moment : dead moment dL/dload under which the load moves; None: the load is given.
     stops : loads at which a motion under dead moment ends.
     tolerance : of the residual, GJ/a; the kinetic energy has to be below its square.
-    most : gradients to be evaluated at most.
-    every : keep every k-th configuration in `Relaxed.history`; 0: none. Where that gets long, every
-        2k-th, 4k-th, ..., so that there are never more than 2,048.
+    most : largest number of evaluations of the gradient.
+    every : keep every k-th configuration in `Relaxed.history`; 0: none. Of a long motion every
+        2k-th, 4k-th, ... is kept, so that there are never more than 2,048.
 
     Raises
     ------
     ValueError
-        For a rod with an edge that nothing bends, such as a strut: it has no masses to move with.
+        For a rod with an edge without bending stiffness, such as a strut: it has no mass.
 
     Notes
     -----
-    Failure to come to rest is a value: see `Relaxed.outcome` and `ADVICE`.
+    Failure to come to rest is a value: see `Relaxed.outcome` and `Relaxed.advice`.
     """
     rod, supports = system.rod, system.supports
     if rod.n_edges > len(rod.cell) + 1:
@@ -391,30 +371,15 @@ def relax(
     album = Album(np.empty((slots, n, 4)), np.empty((slots, n)), np.empty(slots), np.empty(slots))
     free = moment is not None
     aim = Aim(free, 0.0 if moment is None else moment, *stops, tolerance, most, every)
-    end = _relax(rod, supports, aim, motion, pull, masses, album)
-    return _relaxed(
-        State(motion.quat, motion.stretch, pull.force, float(motion.load[0])), end, album
-    )
-
-
-def _relaxed(state: State, end: Ended, album: Album) -> Relaxed:
-    """What is known of a relaxation that has ended."""
-    nothing = np.zeros(len(state.force))
+    ending = _relax(rod, supports, aim, motion, pull, masses, album)
+    values: tuple[float, float, float, float, float]
+    counts: tuple[int, int]
+    (outcome, where), values, counts, kept = ending
+    no_force = np.zeros(len(pull.force))
     history = tuple(
-        State(album.quat[k].copy(), album.stretch[k].copy(), nothing, float(album.load[k]))
-        for k in range(end.kept)
+        State(album.quat[k].copy(), album.stretch[k].copy(), no_force, float(album.load[k]))
+        for k in range(kept)
     )
-    return Relaxed(
-        state,
-        Rest(end.outcome),
-        end.where,
-        end.evaluations,
-        end.restarts,
-        end.residual,
-        end.kinetic,
-        end.energy_start,
-        end.energy,
-        end.moment,
-        history,
-        album.energy[: end.kept].copy(),
-    )
+    state = State(motion.quat, motion.stretch, pull.force, float(motion.load[0]))
+    energies = album.energy[:kept].copy()
+    return Relaxed(state, Rest(outcome), where, *values, history, energies, *counts)

@@ -1,10 +1,11 @@
-"""The discrete rod and its state: what is there, before any load or support.
+"""The discrete rod and its state, without loads or supports.
 
 Edges j = 0 .. n-1 carry material frames, vertices s between neighbouring edges carry the strains.
 Frames sit at arc lengths with spacing ``cell[s]`` (the Voronoi length of vertex s); an edge's rest
-length is half of the cells on its two sides, so that an end edge of an open rod is half an edge:
-the other half lies beyond the end, or beyond a plane of symmetry. All ends, clamped, free or
-mirrored, are thereby treated alike and the error of smooth rods has even powers of the cell only.
+length is half of the cells on its two sides. So an end edge of an open rod is half an edge: the
+other half lies beyond the end, or beyond a plane of symmetry. All ends, clamped, free or mirrored,
+are therefore treated in the same way, and the error of smooth rods has even powers of the cell
+only.
 
     ends    |-o---|---o---|---o-|        o vertex, | middle of an edge (its frame)
     closed  the last vertex joins edge n-1 to edge 0
@@ -22,7 +23,7 @@ from der.scene import MEASURES
 
 
 class Rod(NamedTuple):
-    """A rod's constants, in units of a and GJ/a; built by `rod` (kernels take it as it is)."""
+    """A rod's constants, in units of a and GJ/a; built by `discrete_rod` (kernels take it)."""
 
     cell: Array  # (n_s,) Voronoi length of each vertex
     length: Array  # (n,) rest length of each edge

@@ -1,4 +1,4 @@
-"""How many ways down: the index of a state, class by class, and the softest modes.
+"""The index of a state for each symmetry class, and its softest modes.
 
 The matrix is the Hessian of the Lagrangian, constraint forces included, on the position
 conditions; its negative eigenvalues are those of the bordered matrix less one for each condition.
@@ -31,7 +31,7 @@ _SHIFT = 1e-8  # of the largest stiffness: the second look
 class SymmetryClass(NamedTuple):
     """The modes of one symmetry, as a problem on the sector."""
 
-    free: NDArray[np.bool_]  # (n, b) what may move
+    free: NDArray[np.bool_]  # (n, b) unknowns that may move
     weight: Array  # (n_c, n) conditions on positions
     axis: Array  # (n_c, 3)
 
@@ -102,7 +102,7 @@ def _stiffness(rod, free, factors):
 
 @njit(cache=True)
 def _counts(rod, supports, classes, quat, stretch, force, load, shift, looks):
-    """Index, how safe it is, and (where ``looks``) the stiffness of the softest mode, (k,) each."""
+    """Index, its safety, and (if ``looks``) the stiffness of the softest mode, (k,) each."""
     k = classes.free.shape[0]
     n, b = supports.free.shape
     negative, margin = np.empty(k, dtype=np.int64), np.empty(k)

@@ -1,6 +1,6 @@
-"""Supports and loads of a rod: which unknowns are held, which positions, what the load turns.
+"""Supports and loads of a rod: held unknowns, conditions on positions, and what the load moves.
 
-Everything a rod is attached to is said in five ways, all linear in what the kernels see:
+Five kinds of data describe them, all linear for the kernels:
 
 * ``free``   which entries of an edge's increment may move (a clamped or gripped edge: none);
 * ``axis``, ``weight``  conditions on positions, sum_j weight[k, j] e_j . axis[k] = target[k];
@@ -57,9 +57,9 @@ def supported(
     Raises
     ------
     ValueError
-        For an edge that the rod does not have, or forces of another shape; where an edge turns that
-        is not clamped: its frame would be both free and prescribed; or where one turns that
-        lengthens, too.
+        For an edge that the rod does not have, or forces of another shape. If an edge turns that is
+        not clamped: its frame would be both free and prescribed. Or if an edge both turns and
+        lengthens.
     """
     n = rod.n_edges
     for name, edges in (("clamped", clamped), ("turn", turn or {}), ("reach", reach or {})):

@@ -1,4 +1,4 @@
-"""A supported rod as a system that can be followed: the rod's side of the seam (`der.problem`).
+"""A supported rod as a system for continuation: the rod's side of the seam (`der.problem`).
 
 system = RodSystem(rod, supports)
 found = system.correct(state)                 an equilibrium next to a configuration
@@ -48,7 +48,7 @@ class RodSystem:
 
     @property
     def length(self) -> float:
-        """Length of all that the rod stands for, symmetry images included."""
+        """Length of the rod, symmetry images included."""
         return float(self.rod.length.sum())
 
     @cached_property
@@ -116,8 +116,7 @@ class RodSystem:
                 f" conditions, got {len(guess.quat)} and {len(guess.force)}"
             )
         if value is not None and hold == PARAMETER and value != guess.load:
-            turned = self.retract(guess, self.increment(load=value - guess.load))
-            guess = turned.but(load=float(value))
+            guess = self.at_load(guess, value)
         return correct(
             self.rod,
             self.supports,
@@ -131,6 +130,11 @@ class RodSystem:
     def retract(self, state: State, increment: Increment) -> State:
         """Return a configuration moved by an increment."""
         return retract(self.supports, state, increment)
+
+    def at_load(self, state: State, load: float) -> State:
+        """Return a configuration with its supports moved to a load, all else unchanged."""
+        moved = self.retract(state, self.increment(load=float(load) - state.load))
+        return moved.but(load=float(load))
 
     def difference(self, a: State, b: State) -> Increment:
         """Return the increment that leads from one configuration to another."""

@@ -1,7 +1,7 @@
-"""Checks of what the user, or a file, gave: the value in its proper type, or a ValueError.
+"""Checks of arguments and of entries of files: the value in its proper type, or a ValueError.
 
-Every check takes the name of the thing first, for a message like "h_over_t must be a finite number
-> 0, got -1". A bool is never a number here; numpy's scalars are what they look like.
+The first argument of every check is a name for the message: "h_over_t must be a finite number > 0,
+got -1". A bool is no number; scalars of numpy are numbers.
 """
 
 import math
@@ -27,16 +27,16 @@ def checked_number(
     allowed: str = "a finite number",
     is_allowed: Callable[[float], bool] = lambda number: True,
 ) -> float:
-    """Return `value` as a float where it is a finite real number that `is_allowed` accepts.
+    """Return `value` as a float if it is a finite real number that `is_allowed` accepts.
 
     Parameters
     ----------
     name : str
-        What it is, for the message.
+        Name for the message.
     value : object
-        What was given.
+        The value given.
     allowed : str
-        What is allowed, in words, for the message: "a finite number > 0".
+        The allowed values, in words, for the message: "a finite number > 0".
     is_allowed : callable
         The same as a predicate of a finite float.
 
@@ -51,9 +51,9 @@ def checked_number(
         If `value` is not a number (a bool and a string are none), not finite, or not allowed.
     """
     if type(value) is float and math.isfinite(value) and is_allowed(value):
-        return value  # as nearly all are
+        return value  # the usual case
     number = math.nan
-    if type(value) is float:  # most are: to ask what else is a number takes longer
+    if type(value) is float:  # usual, and faster to test than other numbers
         number = value
     elif isinstance(value, Real) and not isinstance(value, bool):
         with suppress(OverflowError):  # an int too large for a float stays nan
@@ -64,7 +64,7 @@ def checked_number(
 
 
 def shown(value: object) -> str:
-    """A value in a sentence: one line, not too long, and whatever the value is."""
+    """Return any value as text for a sentence: one line of limited length."""
     try:
         text = str(value) if isinstance(value, Real) else repr(value)
     except ValueError:  # integers of more than 4300 digits cannot be printed
@@ -91,9 +91,9 @@ def checked_array(name: str, values: ArrayLike | None, shape: tuple[int | str, .
     Parameters
     ----------
     name : str
-        What it is, for the message.
+        Name for the message.
     values : array_like
-        What was given.
+        The values given.
     shape : tuple
         A number for every dimension of fixed length, a letter for every free one: ("n", 3).
 
@@ -161,7 +161,7 @@ def numbers(name: str, values: object) -> Array:
 
 
 def _are_floats(values: object) -> bool:
-    """Whether this is a plain one-dimensional array of finite floats: no need to look at each."""
+    """Whether this is a plain one-dimensional array of finite floats, which need no check each."""
     plain = type(values) is np.ndarray and values.ndim == 1 and values.dtype == np.float64
     return plain and bool(np.isfinite(values).all())  # type: ignore[call-overload]
 
@@ -186,7 +186,7 @@ def each(name: str, values: object, check: Callable[[str, Any], T]) -> list[T]:
 
 
 def json_object(name: str, value: object) -> dict[str, Any]:
-    """Return a copy of a mapping in JSON's own types, so that it comes back as it is here."""
+    """Return a copy of a mapping in the types of JSON, which a file keeps."""
     if not isinstance(value, Mapping):
         raise ValueError(f"{name} must be a mapping, got {shown(value)}")
     return {
@@ -206,6 +206,6 @@ def _json_value(name: str, value: object) -> object:
         return json_object(name, value)
     if isinstance(value, list | tuple):
         if all(type(entry) is float and math.isfinite(entry) for entry in value):
-            return list(value)  # as long ones are
+            return list(value)  # long lists are of this kind
         return each(name, value, _json_value)
     raise ValueError(f"{name} must be something JSON can hold, got a {type(value).__name__}")

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and the records that are kept in them as JSON."""
+"""Files that are written completely or not at all, and records kept in them as JSON."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Saved:
         raise NotImplementedError
 
     def save(self, path: FilePath) -> None:
-        """Write JSON, whole or not at all.
+        """Write JSON, completely or not at all.
 
         Raises
         ------
         OSError
-            If the file cannot be written; one already there is then unharmed.
+            If the file cannot be written; a file already there is then unchanged.
         """
         content = self.to_json().encode()
         write_whole(path, lambda file: file.write(content))
@@ -49,17 +49,17 @@ def json_entries(text: str) -> dict[str, Any]:
 
 
 def write_whole(path: FilePath, write: Callable[[BinaryIO], object]) -> None:
-    """Write a file beside its target and rename it, so that the target is never half written.
+    """Write a file beside its target and rename it, so that the target is never incomplete.
 
     Raises
     ------
     OSError
-        If it cannot be written; a file already there is then unharmed.
+        If it cannot be written; a file already there is then unchanged.
     """
     target = pathlib.Path(path)
     if not target.parent.is_dir():
         raise FileNotFoundError(f"cannot save {target}: there is no folder {target.parent}")
-    # not tempfile: its files are closed to everyone else, whatever the umask says
+    # not tempfile: its files are readable by their owner alone, whatever the umask is
     beside = target.parent / f".{secrets.token_hex(8)}.tmp"
     try:
         with beside.open("xb") as file:
@@ -67,6 +67,6 @@ def write_whole(path: FilePath, write: Callable[[BinaryIO], object]) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(beside, target)
-    except BaseException:  # Ctrl-C leaves nothing behind either
+    except BaseException:  # Ctrl-C, too, leaves no file behind
         beside.unlink(missing_ok=True)
         raise

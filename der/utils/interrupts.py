@@ -1,4 +1,4 @@
-"""Ctrl-C while compiled kernels run: put off, taken down between states, or ignored."""
+"""Ctrl-C while compiled kernels run: delayed, noted between states, or ignored."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-# Functions in which an exception is lost or ends the process: numba's wrappers call the first while
-# they hand a kernel's results over, and do not look whether it succeeded; that is where a signal
-# arrives that came while the kernel ran. LLVM calls the others from C, which ignores exceptions.
+# Functions in which an exception is lost or ends the process. Numba's wrappers call the first when
+# they return a kernel's results, and do not check whether it succeeded; a signal sent while the
+# kernel ran arrives there. LLVM calls the others from C, which ignores exceptions.
 UNHEARD = ("_numba_unpickle", "_raw_object_cache_notify", "_raw_object_cache_getbuffer")
 MOMENT = 1e-3  # s
 COMPILING = "_compile_for_args"  # numba's, below which kernels are compiled or loaded
 
 
 def put_off(number: int, frame: FrameType | None) -> bool:
-    """Whether a signal's handler may not raise here; the signal then comes again, a moment later.
+    """Whether a signal's handler must not raise here; the signal is then sent again soon after.
 
-    To be asked by every handler that raises. Numba's wrappers answer an exception with a
-    SystemError, or die of it.
+    Every handler that raises has to call this. An exception in numba's wrappers becomes a
+    SystemError, or ends the process.
     """
     if not any(name in UNHEARD for name in _callers(frame)):
         return False
-    # from another thread: at once it would arrive in this handler, and so on
+    # from another thread: sent at once, it would arrive in this handler again
     _thread.start_new_thread(_again, (number,))
     return True
 
@@ -38,7 +38,7 @@ def _again(number: int) -> None:
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt as Python's own handler does, but where it will be heard."""
+    """Raise KeyboardInterrupt as Python's own handler does, but only where it is not lost."""
     if not put_off(number, frame):
         signal.default_int_handler(number, frame)
 
@@ -52,17 +52,17 @@ def _callers(frame: FrameType | None) -> Iterator[str]:
 
 @contextmanager
 def interrupts_heard() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt where kernels run, too, for a program that then ends."""
+    """Let Ctrl-C raise KeyboardInterrupt while kernels run, for a program that then ends."""
     with _answered_by(interrupt):
         yield
 
 
 @contextmanager
 def interrupts_between_states() -> Iterator[list[int]]:
-    """Take down Ctrl-C in a list, instead of raising; a second one raises at once.
+    """Note Ctrl-C in a list, instead of raising; a second one raises at once.
 
-    In a program that then ends so does the first while kernels are being compiled, which takes
-    long; elsewhere compiling goes on, for numba cannot take up again what was broken off.
+    While kernels are compiled, which takes long, the first one also raises in a program that then
+    ends. In other programs compilation continues, because numba cannot resume it.
     """
     pressed: list[int] = []
     ends = signal.getsignal(signal.SIGINT) is interrupt
@@ -79,7 +79,7 @@ def interrupts_between_states() -> Iterator[list[int]]:
 
 @contextmanager
 def _answered_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Have a function answer Ctrl-C, unless somebody else already does."""
+    """Let a function handle Ctrl-C, unless another handler is installed."""
     usual = signal.getsignal(signal.SIGINT)
     ours = threading.current_thread() is threading.main_thread()
     if not ours or usual not in (signal.default_int_handler, interrupt):
@@ -94,10 +94,10 @@ def _answered_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[N
 
 @contextmanager
 def interrupts_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C while workers are put away: a second one would leave semaphores behind."""
+    """Ignore Ctrl-C while workers are closed: a second one would leave semaphores behind."""
     usual = threading.current_thread() is threading.main_thread()
     before = signal.getsignal(signal.SIGINT)
-    if not usual or before is None:  # None: whoever set it can set it again, we cannot
+    if not usual or before is None:  # None: a handler that Python cannot set again
         yield
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""One run loop for every analysis: Ctrl-C, failure, time and status, around what is handed out.
+"""One run loop for every analysis: Ctrl-C, failure, time and status.
 
 with Run() as run:
     points = run.collect(follow(...), progress)
@@ -24,10 +24,10 @@ R = TypeVar("R", bound=Any)
 
 
 class Run:
-    """How an analysis goes: "done", "not converged" or "interrupted", and why.
+    """The status of an analysis: "done", "not converged" or "interrupted", and why.
 
-    Ctrl-C is noted and heard between two states; a second one is heard at once. What was found
-    before is never lost.
+    Ctrl-C is noted and takes effect between two states; a second one takes effect at once. Points
+    found before are always kept.
     """
 
     def __init__(self) -> None:
@@ -54,16 +54,16 @@ class Run:
 
     @property
     def pressed(self) -> bool:
-        """Whether Ctrl-C was pressed since it was last heard."""
+        """Whether Ctrl-C was pressed and has not taken effect yet."""
         return bool(self._pressed)
 
     @property
     def done(self) -> bool:
-        """Whether nothing has stopped it so far."""
+        """Whether the analysis has not been stopped so far."""
         return self.status == "done" and not self._pressed
 
     def stop(self, reason: Reason, message: str = "") -> None:
-        """Note why the analysis has ended before it was done."""
+        """Note why the analysis has ended early."""
         self.status = "interrupted" if reason is Reason.INTERRUPTED else "not converged"
         self.reason, self.message = reason, message or reason.value
 
@@ -72,7 +72,7 @@ class Run:
         self.reason, self.message = reason, reason.value
 
     def prepare(self, work: Callable[[], object]) -> None:
-        """Do what does not count as time of the analysis, such as loading kernels."""
+        """Do work that does not count as time of the analysis, such as loading kernels."""
         self.attempt(work)
         self.started = time.perf_counter()
 
@@ -91,13 +91,13 @@ class Run:
         return path
 
     def marked(self, record: R) -> R:
-        """Return a record with the status that the analysis has come to by now."""
+        """Return a record with the present status of the analysis."""
         assert self.reason is not None
         ending = {"status": self.status, "message": self.message, "reason": self.reason.word}
         return replace(record, **ending)
 
     def collect(self, found: Iterable[T], progress: Callable[[T], object] | None = None) -> list[T]:
-        """Return everything that is handed out, until it fails or Ctrl-C is pressed."""
+        """Return everything that ``found`` yields, until it fails or Ctrl-C is pressed."""
         kept: list[T] = []
         if self.status != "done":
             return kept
@@ -114,12 +114,12 @@ class Run:
         return kept
 
     def attempt(self, work: Callable[[], T]) -> T | None:
-        """Return what ``work`` returns; None, and the status says why, where it fails or stops."""
+        """Return the result of ``work``; None, with a status, if it fails or is stopped."""
         try:
             return work()
         except ContinuationFailed as failed:
             self.stop(failed.reason, str(failed))
         except KeyboardInterrupt:
-            self._pressed.clear()  # one more must not lose what there is
+            self._pressed.clear()  # one more must not lose the points found
             self.stop(Reason.INTERRUPTED)
         return None

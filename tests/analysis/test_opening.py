@@ -12,7 +12,7 @@ from rods import turned_all
 
 import der
 from der.analysis.landscape.actuators import struts, wrenches
-from der.analysis.landscape.barrier import barrier, twisted_rests
+from der.analysis.landscape.barrier import barrier, twisted_states
 from der.analysis.landscape.opening import least_push
 from der.analysis.landscape.opening_path import opened
 from der.analysis.landscape.opening_search import Search, refine, scan
@@ -42,7 +42,7 @@ def scene(h_over_t=4.0, ring=None, **numerics):
 @functools.cache
 def folded(h_over_t=4.0, n_edges=48):
     """The free folded circle, and its energy."""
-    rests, free, _, _ = twisted_rests(scene(h_over_t, n_edges=n_edges))
+    rests, free, _, _ = twisted_states(scene(h_over_t, n_edges=n_edges))
     return free[-1], rests[-1].energy
 
 
@@ -355,7 +355,7 @@ def test_the_search_goes_on_between_the_points_of_its_grid():
 
     like = searched().pushes[0]
     ellipse = der.Scene(der.ellipse(0.6), der.rectangular_section(4.0), n_edges=48)
-    rests, free, _, _ = twisted_rests(ellipse)
+    rests, free, _, _ = twisted_states(ellipse)
     for barrier_there, expected in ((1.0, (5, 17)), (5.0, (4, 16))):
         search = Bowl(ellipse, free[-1], {"folded": rests[-1].energy}, math.inf)
         scan(search, 12, Run(), None)

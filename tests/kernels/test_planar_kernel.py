@@ -90,7 +90,7 @@ def test_tangent_leads_along_the_path():
     ring = mesh(der.ellipse(0.6))
     rod = ring.strutted()
     flat = solved(ring.rod(1), covered(ring, 1), np.zeros(2))
-    first = float(ring.way() @ (ring.length * np.sin(flat.phi)))
+    first = float(ring.chord() @ (ring.length * np.sin(flat.phi)))
     at = solved(rod, np.append(flat.phi, 0.5 * math.pi), np.zeros(4), 0.8 * first)
     assert at.converged
     step = 1e-4
@@ -112,7 +112,7 @@ def test_a_squeezed_ring_is_that_of_the_rod_in_space(ring):
     scene = der.Scene(ring, SECTION, n_edges=32)
     here = planar_ring(scene)
     flat = solved(here.rod(1), covered(here, 1), np.zeros(2))
-    first = float(here.way() @ (here.length * np.sin(flat.phi)))
+    first = float(here.chord() @ (here.length * np.sin(flat.phi)))
     rod, half = here.strutted(), 0.5 * math.pi
     middle = solved(rod, np.append(flat.phi, half), np.append(flat.force, [0, 0]), 0.9 * first)
     plane = solved(rod, middle.phi, middle.force, 0.8 * first)
@@ -217,7 +217,7 @@ def pulled(ring, n, goal, **options):
     """Rod and path of a flat ring whose points are drawn apart, to so many a."""
     here = mesh(ring, n)
     flat = solved(here.rod(1), covered(here, 1), np.zeros(2))
-    first = float(here.way() @ (here.length * np.sin(flat.phi)))
+    first = float(here.chord() @ (here.length * np.sin(flat.phi)))
     force = np.append(flat.force, [0.0, 0.0])
     start = solved(here.strutted(), np.append(flat.phi, 0.5 * math.pi), force, first)
     return here.strutted(), to_goal(PlanarRodSystem(here.strutted()), start, goal, **options)

@@ -19,7 +19,7 @@ from der.problem import Increment, Point, Statistics
 from der.rod.dynamics import flow, swing
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
-from der.rod.implicit_step import on_the_conditions, step, weights
+from der.rod.implicit_step import Inertia, on_the_conditions, step, weights
 from der.rod.relaxation import Rest, relax
 from der.rod.rod import State
 
@@ -284,11 +284,12 @@ def test_a_step_is_not_taken_to_a_saddle():
     ring, points = folded(1.6, "angle")
     before, _ = first_snap(points)
     tilted = ring.retract(before.state, kick(ring, before, load=False))
-    on = on_the_conditions(ring.rod, ring.supports, tilted).state
-    mass = weights(ring.rod, ring.supports)
-    options = {"known": 0.0 * mass, "moment": None, "tolerance": 1e-9}
-    long = step(ring.rod, ring.supports, on, on, mass=mass, shift=1e-9, **options)
-    short = step(ring.rod, ring.supports, on, on, mass=mass, shift=1e3, **options)
+    on = on_the_conditions(ring, tilted).state
+    mass = weights(ring)
+    long, short = (
+        step(ring, on, on, Inertia(mass, 0.0 * mass, shift), tolerance=1e-9)
+        for shift in (1e-9, 1e3)
+    )
     assert long.reason is Reason.SINGULAR
     assert short.reason is Reason.CONVERGED
 

@@ -109,7 +109,7 @@ def _planar(repeats: int, n: int) -> Row:
     scene = circle(4.0, n_edges=n, **BARE)
     mesh = planar_ring(scene)
     flat = solved(mesh.rod(1), covered(mesh, 1), np.zeros(2))
-    first = float(mesh.way() @ (mesh.length * np.sin(flat.phi)))
+    first = float(mesh.chord() @ (mesh.length * np.sin(flat.phi)))
     lengths = np.linspace(first, 0.1 * first, 19)
     ring = ring_of(scene, "full")
     strut = struts(balance(ring.rod, ring.start.quat, ring.start.stretch), (0, n // 2))[-1]

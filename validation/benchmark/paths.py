@@ -11,7 +11,7 @@ import der
 from der.analysis.loading import follow_angle
 from der.analysis.loading_by_relaxation import follow_relaxed
 from der.analysis.request import Request
-from der.analysis.snap import snap
+from der.analysis.snap import Snap
 from der.problem import Point, Statistics
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
@@ -88,7 +88,7 @@ def snaps(repeats: int) -> Iterator[Row]:
         ring = gripped_ring(der.circle(), der.rectangular_section(1.6), 64, name=name)
         marched = follow_angle(ring, REQUEST, Statistics())
         before = next(one.solution for one in marched if one.kind == "fold")
-        snapping = partial(snap, ring, REQUEST, Statistics(), before, before.tangent)
+        snapping = partial(Snap(ring, REQUEST, Statistics(), before).landing, before.tangent)
         milliseconds = 1e3 * cpu_time(snapping, repeats)
         note = f"{snapping().details['force_evaluations']} force evaluations"
         yield Row("snap", f"h/t 1.6, N 64, {name}", milliseconds, "ms", 100.0, note)

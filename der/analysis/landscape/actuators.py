@@ -1,25 +1,26 @@
 """Actuators that open a free ring: a strut between two of its points, or two wrenches.
 
-Loads on a ring that floats in space balance each other, whatever it does:
+The ring floats in space, so the loads on it are always in balance:
 
-    force    a strut, hinged to the ring at both ends, that is made longer or shorter. It is one
-             more edge, which nothing bends, whose ends sit on the ring: three position conditions.
-             Its multiplier is the pair of forces, always along the line between the two points.
-    couple   two wrenches that hold the directions of two cross-sections, and turn one of them
-             against the other about an axis fixed to the first. The load is the couple about that
-             axis; what keeps the other two directions is a couple, too. No force acts.
+    force    a strut, hinged to the ring at both ends, becomes longer or shorter. It is one more
+             edge without bending stiffness; three position conditions attach its ends to the ring.
+             Their multipliers are the pair of forces, always along the line between the points.
+    couple   two wrenches hold the directions of two cross-sections and turn one against the other
+             about an axis fixed to the first. The load is the couple about that axis; the other
+             two directions are held by couples, too. No force acts.
 
-In both the load is what is prescribed: a length, or an angle. Its conjugate dL/dload is the force
-or the couple, dU is its work, and a state's index is that of the ring in its actuator, held.
+The load is the prescribed length or angle. Its conjugate dL/dload is the force or the couple, dU is
+its work, and the index of a state is that of the ring with the actuator held.
 
-The ring is renumbered so that the first point is edge 0, whose frame is held: by the wrench,
-or to take out rigid rotations. With a strut, it is cut there and stands at both ends of an open
-rod, in halves; both are held alike, so that they stay one.
+The ring is renumbered so that the first point is edge 0, whose frame is held: by the wrench, or to
+remove rigid rotations. With a strut the ring is cut there: one half of edge 0 stands at each end of
+an open rod, and both halves are held alike, so that they stay together.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,37 +30,39 @@ from der.kernels.quaternions import Array, rotation
 from der.rod.free_ring import FreeRing
 from der.rod.gripped_ring import E1, E2, E3, free_supports
 from der.rod.manifold import split
+from der.rod.planar_ring import chord_weights
 from der.rod.rod import Rod, State
 from der.rod.supports import supported
 from der.rod.system import RodSystem
 
 APART, TOGETHER, OUT = "apart", "together", "out of plane"
-LIFTED = (
-    1e-3  # of the ring's length: a strut between points that lie in each other starts this long
-)
-_ONE_PLACE = 1e-6  # of the ring's length: points that lie in each other
-_MET = 0.02  # of a strut's first length: its ends have met
-_TAUT = 0.97  # of the shorter way along the ring: a strut cannot be much longer
+LIFTED = 1e-3  # of the ring's length: first length of a strut between coincident points
+_ONE_PLACE = 1e-6  # of the ring's length: points that coincide
+_MET = 0.02  # of a strut's first length: its ends meet
+_TAUT = 0.97  # of the shorter arc between the points: largest length of a strut
 _ROUND = 2.0 * np.pi  # rad, the most that a wrench turns
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """A ring in an actuator that is about to be used."""
+    """A ring in an actuator, before loading."""
 
     kind: str  # "force" or "couple"
-    points: tuple[int, int]  # edges of the ring whose middles it is put to
-    direction: str  # in a word or two
-    axis: Array  # (3,) in which the second point is pushed, or about which it is turned
+    points: tuple[int, int]  # edges of the ring at whose middles it acts
+    direction: str  # a short name
+    axis: Array  # (3,) direction in which the second point moves, or axis about which it turns
     system: RodSystem  # the ring in the actuator; its load is the push
     start: State  # at load 0
-    first: float  # length of a strut at load 0, a; 0 for wrenches
-    sense: float  # 1: the load lengthens, or turns to the right about the axis
-    load_max: float  # at which the actuator has no more room
-    rod: Rod  # of the ring without it
+    load_max: float  # largest load
+    rod: Rod  # of the ring without the actuator
+
+    @property
+    def first(self) -> float:
+        """Length of a strut at load 0, a."""
+        return float(self.system.rod.length[-1])
 
     def released(self, state: State) -> State:
-        """A state of the ring in the actuator, without it: no equilibrium in general."""
+        """The same shape of the ring without the actuator; in general no equilibrium."""
         n, first = self.rod.n_edges, self.points[0]
         return State(
             np.roll(state.quat[:n], first, axis=0),
@@ -69,7 +72,7 @@ class Actuator:
         )
 
     def shape(self, state: State) -> tuple[Array, Array]:
-        """Vertices (N, 3) of the ring in the actuator, and the two points (2, 3) it is put to."""
+        """Vertices (N, 3) of the ring in the actuator, and the two loaded points (2, 3)."""
         free = self.released(state)
         x = vertices(free.quat, self.rod.length * (1.0 + free.stretch))
         return x, _places(self.rod, free, x)[list(self.points)]
@@ -78,111 +81,93 @@ class Actuator:
 def _places(rod: Rod, state: State, x: Array) -> Array:
     """Points (n, 3) at which the frames of a closed ring sit, from its vertices.
 
-    Edge j ends at vertex j, and its frame sits half of the cell before that.
+    Edge j ends at vertex j; its frame sits half a cell before.
     """
     before = 0.5 * rod.cell * (1.0 + state.stretch)
     return np.asarray(x - before[:, None] * rotation(state.quat)[:, :, 2])
 
 
-def _renumbered(free: FreeRing, first: int) -> tuple[Rod, State]:
-    """The same ring with edge ``first`` for edge 0."""
-    rod, state = free.rod, free.state
-    rolled = rod._replace(**{name: np.roll(getattr(rod, name), -first, axis=0) for name in _ROLLED})
-    return rolled, state.but(
-        quat=np.roll(state.quat, -first, axis=0), stretch=np.roll(state.stretch, -first)
-    )
+@dataclass(frozen=True)
+class _Renumbered:
+    """A ring whose edge 0 is the first of two points, and its state."""
 
+    points: tuple[int, int]  # by the numbers of the original ring
+    original: Rod
+    rod: Rod
+    state: State
 
-_ROLLED = ("cell", "length", "mass", "rest")
+    @classmethod
+    def of(cls, free: FreeRing, points: tuple[int, int]) -> _Renumbered:
+        """The ring, renumbered."""
+
+        def rolled(own: Any, *names: str) -> dict[str, Array]:
+            return {name: np.roll(getattr(own, name), -points[0], axis=0) for name in names}
+
+        rod = free.rod._replace(**rolled(free.rod, "cell", "length", "mass", "rest"))  # type: ignore[arg-type]
+        state = free.state.but(**rolled(free.state, "quat", "stretch"))
+        return cls(points, free.rod, rod, state)
+
+    @property
+    def far(self) -> int:
+        """Number of the second point's edge."""
+        return (self.points[1] - self.points[0]) % self.rod.n_edges
 
 
 # --- Struts ----------------------------------------------------------------------------------
 
 
 def struts(free: FreeRing, points: tuple[int, int]) -> list[Actuator]:
-    """A strut between two points, made longer, and made shorter where there is any length.
+    """Struts between two points that become longer, and shorter if their first length is not 0.
 
-    Where the points lie in each other a strut may start in the three directions in which the ring
-    yields in the direction of the push: eigenvectors of its compliance.
+    Where the points coincide a strut may start in three directions, the eigenvectors of the ring's
+    compliance between the points: a force along one moves the points apart along it.
     """
-    rod, state = _renumbered(free, points[0])
-    far = (points[1] - points[0]) % rod.n_edges
-    weight = _way(rod, far)
-    length = rod.length * (1.0 + state.stretch)
-    chord = (weight * length) @ rotation(state.quat)[:, :, 2]
-    first = float(np.linalg.norm(chord))
-    around = float(rod.length.sum())
-    along = np.cumsum(rod.cell)[far - 1]
-    taut = _TAUT * float(min(along, around - along))
+    ring = _Renumbered.of(free, points)
+    weight = chord_weights(ring.rod.cell, ring.rod.length, ring.far)
+    lengths = ring.rod.length * (1.0 + ring.state.stretch)
+    chord = (weight * lengths) @ rotation(ring.state.quat)[:, :, 2]
+    first, around = float(np.linalg.norm(chord)), float(ring.rod.length.sum())
+    along = np.cumsum(ring.rod.cell)[ring.far - 1]
+    room = _TAUT * float(min(along, around - along)) - first
     if first > _ONE_PLACE * around:
-        longer = _strutted(free, points, chord / first, first, 1.0, taut - first, APART)
-        shorter = _strutted(
-            free, points, chord / first, first, -1.0, (1.0 - _MET) * first, TOGETHER
-        )
-        return [longer, shorter] if taut > first else [shorter]
-    first = LIFTED * around
+        longer = [_strutted(ring, chord, 1.0, room, APART)] if room > 0.0 else []
+        return [*longer, _strutted(ring, chord, -1.0, (1.0 - _MET) * first, TOGETHER)]
+    room += first - LIFTED * around
     normal = _normal(free.state)
     return [
         _strutted(
-            free,
-            points,
-            axis,
-            first,
-            1.0,
-            taut - first,
-            OUT if abs(float(axis @ normal)) > 0.9 else APART,
+            ring, LIFTED * around * axis, 1.0, room, OUT if abs(axis @ normal) > 0.9 else APART
         )
-        for axis in _yielding(free, points)
+        for axis in _compliant_axes(ring)
     ]
 
 
-def _way(rod: Rod, far: int) -> Array:
-    """Weights (n,) of edges whose sum leads from the middle of edge 0 to that of ``far``."""
-    weight = np.zeros(rod.n_edges)
-    weight[1:far] = 1.0
-    weight[0] = 0.5 * rod.cell[0] / rod.length[0]
-    weight[far] = 0.5 * rod.cell[far - 1] / rod.length[far]
-    return weight
-
-
 def _strutted(
-    free: FreeRing,
-    points: tuple[int, int],
-    axis: Array,
-    first: float,
-    sense: float,
-    load_max: float,
-    direction: str,
+    ring: _Renumbered, chord: Array, sense: float, load_max: float, direction: str
 ) -> Actuator:
-    ring, state = _renumbered(free, points[0])
-    n, far = ring.n_edges, (points[1] - points[0]) % ring.n_edges
-    length = np.concatenate([ring.length, [0.5 * ring.cell[-1], first]])
-    length[0] = 0.5 * ring.cell[0]
+    """A strut that starts as ``chord`` (3,)."""
+    first = float(np.linalg.norm(chord))
+    own, state, n = ring.rod, ring.state, ring.rod.n_edges
+    length = np.concatenate([own.length, [0.5 * own.cell[-1], first]])
+    length[0] = 0.5 * own.cell[0]
     mass = length / length[:-1].sum()
-    mass[-1] = 0.0  # how a strut turns is no distance along a path
-    rod = ring._replace(length=length, mass=mass[:, None], closed=False)
+    mass[-1] = 0.0  # rotations of the strut do not count in norms
+    rod = own._replace(length=length, mass=mass[:, None], closed=False)
     closing, placed = np.ones(n + 2), np.zeros(n + 2)
     closing[-1] = 0.0
-    placed[:n] = _way(ring, far)
+    placed[:n] = chord_weights(own.cell, own.length, ring.far)
     placed[0], placed[-1] = 1.0, -1.0
     conditions = [(weight, e, 0.0) for weight in (closing, placed) for e in (E1, E2, E3)]
     supports = supported(rod, clamped=(0, n), held=tuple(conditions), reach={n + 1: sense})
     supports.free[[0, n], 3:] = True
-    supports.free[-1] = [True, True, False, False][: rod.block]  # nor has it a spin, or a strain
+    supports.free[-1] = [True, True, False, False][: rod.block]  # a strut has no spin or strain
+    axis = chord / first
     quat = np.vstack([state.quat, state.quat[:1], _with_tangent(axis)])
     stretch = np.concatenate([state.stretch, [state.stretch[0], 0.0]])
+    system = RodSystem(rod, supports, parameter_name="push")
     start = State(quat, stretch, np.zeros(6), 0.0)
     return Actuator(
-        "force",
-        points,
-        direction,
-        sense * axis,
-        RodSystem(rod, supports, parameter_name="push"),
-        start,
-        first,
-        sense,
-        load_max,
-        free.rod,
+        "force", ring.points, direction, sense * axis, system, start, load_max, ring.original
     )
 
 
@@ -193,12 +178,11 @@ def _with_tangent(axis: Array) -> Array:
     return half / size if size > 1e-8 else np.array([0.0, 1.0, 0.0, 0.0])
 
 
-def _yielding(free: FreeRing, points: tuple[int, int]) -> Array:
-    """Directions (3, 3), the softest first, in which a pair of forces moves its points apart."""
-    rod, state = _renumbered(free, points[0])
-    far = (points[1] - points[0]) % rod.n_edges
+def _compliant_axes(ring: _Renumbered) -> Array:
+    """Directions (3, 3), the most compliant first, in which a force pair parts its points."""
+    rod, state = ring.rod, ring.state
     supports = free_supports(rod)
-    weight = np.tile(_way(rod, far), (3, 1))
+    weight = np.tile(chord_weights(rod.cell, rod.length, ring.far), (3, 1))
     measured = supports._replace(weight=weight, axis=np.eye(3), target=np.zeros(3))
     border = assemble(rod, measured, state.quat, state.stretch, np.zeros(3), 0.0).border
     compliance = np.empty((3, 3))
@@ -214,11 +198,13 @@ def _yielding(free: FreeRing, points: tuple[int, int]) -> Array:
 
 
 def wrenches(free: FreeRing, points: tuple[int, int]) -> list[Actuator]:
-    """Two wrenches at two points of the planar folded ring, that turn about each of three axes.
+    """Wrenches at two points of the planar folded ring that turn about each of three axes.
 
-    Along the line between the points, across it in the plane, and normal to it. The mirror image
-    in its plane maps a folded ring to itself, so that both senses are alike about the first two.
+    The axes are the line between the points, the normal to it in the plane, and the normal to the
+    plane. Reflection in its plane maps a folded ring to itself, so both senses are equivalent about
+    the first two.
     """
+    ring = _Renumbered.of(free, points)
     first, second = (rotation(free.state.quat[j]) for j in points)
     normal = _normal(free.state)
     x = vertices(free.state.quat, free.rod.length * (1.0 + free.state.stretch))
@@ -228,45 +214,29 @@ def wrenches(free: FreeRing, points: tuple[int, int]) -> list[Actuator]:
         line = first[:, 2] + second[:, 2]
     line = line - (line @ normal) * normal
     line /= np.linalg.norm(line)
-    axes = (
-        ("about the line", line),
-        ("across the line", np.cross(normal, line)),
-        ("about the normal", normal),
-    )
     return [
-        _wrenched(free, points, axis, sense, name)
-        for name, axis in axes
-        for sense in ((1.0, -1.0) if axis is normal else (1.0,))
+        _wrenched(ring, line, 1.0, "about the line"),
+        _wrenched(ring, np.cross(normal, line), 1.0, "across the line"),
+        _wrenched(ring, normal, 1.0, "about the normal"),
+        _wrenched(ring, normal, -1.0, "about the normal, reversed"),
     ]
 
 
-def _wrenched(
-    free: FreeRing, points: tuple[int, int], axis: Array, sense: float, direction: str
-) -> Actuator:
-    rod, state = _renumbered(free, points[0])
-    far = (points[1] - points[0]) % rod.n_edges
+def _wrenched(ring: _Renumbered, axis: Array, sense: float, direction: str) -> Actuator:
+    rod = ring.rod
     one = np.ones(rod.n_edges)
     supports = supported(
         rod,
-        clamped=(0, far),
+        clamped=(0, ring.far),
         held=tuple((one, e, 0.0) for e in (E1, E2, E3)),
-        turn={far: sense},
+        turn={ring.far: sense},
         turn_axis=tuple(axis),
     )
-    supports.free[[0, far], 3:] = True
-    start = state.but(force=np.zeros(3), load=0.0)
-    named = direction if sense > 0.0 else f"{direction}, reversed"
+    supports.free[[0, ring.far], 3:] = True
+    system = RodSystem(rod, supports, parameter_name="push")
+    start = ring.state.but(force=np.zeros(3), load=0.0)
     return Actuator(
-        "couple",
-        points,
-        named,
-        sense * axis,
-        RodSystem(rod, supports, parameter_name="push"),
-        start,
-        0.0,
-        sense,
-        _ROUND,
-        free.rod,
+        "couple", ring.points, direction, sense * axis, system, start, _ROUND, ring.original
     )
 
 

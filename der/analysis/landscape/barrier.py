@@ -1,12 +1,13 @@
-"""The barrier of a ring left free in space: the lowest way found from flat to folded.
+"""The barrier of the free ring: the lowest path found from flat to folded.
 
-It starts from what twisting knows. Rests of the twisted ring are equilibria of the ring left free
-(`landscape_alone`), so its saddle is one of the free ring's: where it has one way down, it is the
-pass itself; where it has more, modes that break the symmetry of twisting lead down to lower
-saddles, and eigenvector following (`landscape_saddles`) finds them. So do the softest modes of the
-folded ring, uphill. From every saddle of index 1 the ring then flows down on both sides; the pass
-is the lowest that has the flat ring on one side and the folded one on the other, and the two flows
-are the minimum-energy path. That no lower saddle exists is not proved, only looked for.
+The search starts from the path of twisting. Equilibria of the twisted ring without load are
+equilibria of the free ring (`rod.free_ring`), so the saddle of twisting is a saddle of the free
+ring. If its index is 1, it is the pass. If the index is larger, modes that break the symmetry of
+twisting lead down to lower saddles, which eigenvector following (`saddle_search`) finds. It also
+follows the softest modes of the folded ring uphill. From every saddle of index 1 the ring then
+flows down on both sides. The pass is the lowest saddle with the flat ring on one side and the
+folded ring on the other, and the two flows are the minimum-energy path. The search does not prove
+that no lower saddle exists.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import math
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, permutations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,11 +39,11 @@ from der.rod.rod import State
 from der.scene import Scene, meshes
 from der.utils.run import Run
 
-_KICK = 0.05  # rad, root mean square: off a saddle of higher index, along a mode that leads down
-_NUDGE = 0.02  # rad, likewise: off a saddle of index 1, on to one of its two sides
+_KICK = 0.05  # rad, root mean square: from a saddle of higher index, along an unstable mode
+_NUDGE = 0.02  # rad, likewise: from a saddle of index 1 to one of its two sides
 _SOFTEST = 2  # modes of the folded ring that are followed uphill
-ALIKE = 1e-6  # of the folded ring's energy: two saddles, or rests, that are one
-_SHAPES = 60  # on the way, about equally far apart
+ALIKE = 1e-6  # of the folded ring's energy: two saddles, or end states, that are one
+_SHAPES = 60  # on the path, about equally far apart
 
 
 @dataclass(frozen=True)
@@ -54,16 +56,16 @@ class _Found:
 
 
 def barrier(scene: Scene) -> Pass:
-    """The lowest way found between the flat and the folded ring, left free in space.
+    """Return the lowest path found between the flat and the folded free ring.
 
     Parameters
     ----------
-    scene : ring, section and mesh; how it is controlled does not matter.
+    scene : ring, section and mesh; its control does not matter.
 
     Notes
     -----
-    Where there is none, ``why`` says so in a sentence. With the scene's ``error_bars`` its barriers
-    are extrapolated, too. Ctrl-C keeps the saddles found so far.
+    If no path is found, ``why`` says so in a sentence. With the scene's ``error_bars`` the barriers
+    are also extrapolated. Ctrl-C keeps the saddles found so far.
     """
     with Run() as run:
         one = _pass(scene, run)
@@ -77,106 +79,104 @@ def barrier(scene: Scene) -> Pass:
 
 
 def _pass(scene: Scene, run: Run) -> Pass:
-    """The lowest way found on one mesh."""
+    """The lowest path found on one mesh."""
     started = time.perf_counter()
-    rests, free, twisting, why = twisted_rests(scene)
-    found: list[_Found] = []
-    if not why:
-        end = rests[-1]
-        ends = {"flat": rests[0].energy, "folded": end.energy}
-        if end.index_free != 0:
-            index = "unknown" if end.index_free is None else str(end.index_free)
-            why = f"the free folded ring is no well; its index is {index}"
-        else:
-            found = _passes(rests, free, twisting, ends, run)
+    twisted = twisted_states(scene)
+    why = twisted.no_well
+    found = [] if why else _passes(twisted, run)
     across = [one for one in found if set(one.saddle.ends) == {"flat", "folded"}]
     if run.pressed and not why:
         why = "stopped by the user before all saddles were looked for"
     if not why and not across:
         why = "no saddle was found between the flat and the folded ring"
-    ring = ring_of(scene)
-    best = across[0] if across else None
-    way, shapes = _way(best) if best is not None else (np.zeros((0, 2)), np.zeros((0, 0, 3)))
-    heights = (
-        (None, None)
-        if best is None
-        else (best.saddle.energy - rests[0].energy, best.saddle.energy - rests[-1].energy)
-    )
+    way, shapes, heights = np.zeros((0, 2)), np.zeros((0, 0, 3)), Heights(None, None)
+    if across:
+        way, shapes = _path_over(across[0])
+        energy, ends = across[0].saddle.energy, twisted.ends
+        heights = Heights(energy - ends["flat"], energy - ends["folded"])
     return Pass(
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
-        numerics=mesh_numerics(scene, ring),
-        barriers=Heights(*heights),
-        twisting=twisting,
-        saddle=None if best is None else best.saddle,
+        numerics=mesh_numerics(scene, ring_of(scene)),
+        barriers=heights,
+        twisting=twisted.barriers,
+        saddle=across[0].saddle if across else None,
         saddles=tuple(one.saddle for one in found),
         way=way,
         why=why,
-        status="interrupted" if run.pressed else "done" if rests else "not converged",
+        status="interrupted" if run.pressed else "done" if twisted.rests else "not converged",
         extrapolated={},
         timing=SolveTime(time.perf_counter() - started),
         shapes=shapes,
     )
 
 
-def twisted_rests(scene: Scene) -> tuple[list[Rest], list[FreeRing], Barriers, str]:
-    """Rests on the path of twisting, the same without grips, and why there is no pass."""
+class Twisted(NamedTuple):
+    """Equilibria without load on the path of twisting, and the same ones without grips."""
+
+    rests: list[Rest]
+    free: list[FreeRing]
+    barriers: Barriers
+    why: str  # why the path does not reach the folded ring; "" if it does
+
+    @property
+    def ends(self) -> dict[str, float]:
+        """Energies of the flat and of the folded ring."""
+        return {"flat": self.rests[0].energy, "folded": self.rests[-1].energy}
+
+    @property
+    def no_well(self) -> str:
+        """Why the free folded ring is no well; "" if it is."""
+        if self.why or self.rests[-1].index_free == 0:
+            return self.why
+        index = self.rests[-1].index_free
+        known = "unknown" if index is None else index
+        return f"the free folded ring is no well; its index is {known}"
+
+
+def twisted_states(scene: Scene) -> Twisted:
+    """Return the equilibria without load on the path of twisting, from flat to folded."""
     ring, full = ring_of(scene), ring_of(scene, "full")
     request, statistics = bare_request(scene), Statistics()
     try:
         points = list(request.follow(ring, statistics))
         points, at = with_rests(ring, request, points, statistics)
     except ContinuationFailed as failed:
-        return [], [], barriers((), folded=False, message=str(failed)), str(failed)
+        return Twisted([], [], barriers((), folded=False, message=str(failed)), str(failed))
     folded = ring.folded(points[-1].solution.state)
     exact = replace(request, stability=True)
     rests = [rest_of(ring, full, exact.point(ring, points[k].solution), k) for k in at]
     free = [released(ring, full, points[k].solution.state) for k in at]
     twisting = barriers(rests, folded=folded)
-    return rests, free, twisting, "" if folded else twisting.why["fold"]
+    return Twisted(rests, free, twisting, "" if folded else twisting.why["fold"])
 
 
-def _passes(
-    rests: list[Rest],
-    free: list[FreeRing],
-    twisting: Barriers,
-    ends: dict[str, float],
-    run: Run,
-) -> list[_Found]:
-    """Saddles of index 1 from all starts, each once, lowest first."""
+def _passes(twisted: Twisted, run: Run) -> list[_Found]:
+    """Saddles of index 1 from all initial guesses, each once, lowest first."""
     found: list[_Found] = []
-    alike = ALIKE * abs(ends["folded"])
-    for candidate, twisted in _candidates(rests, free, twisting):
+    alike = ALIKE * abs(twisted.ends["folded"])
+    for candidate, of_twisting in _candidates(twisted):
         if run.pressed:
             break
-        energy = _energy(candidate)
-        if any(abs(one.saddle.energy - energy) < alike for one in found):
-            continue
-        found.append(_described(candidate, energy, ends, twisted=twisted))
+        energy = candidate.polished().energy
+        if not any(abs(one.saddle.energy - energy) < alike for one in found):
+            found.append(_described(candidate, energy, twisted.ends, twisted=of_twisting))
     return sorted(found, key=lambda one: one.saddle.energy)
 
 
-def _candidates(
-    rests: list[Rest], free: list[FreeRing], twisting: Barriers
-) -> Iterator[tuple[FreeRing, bool]]:
+def _candidates(twisted: Twisted) -> Iterator[tuple[FreeRing, bool]]:
     """Saddles of index 1, polished, and whether each is that of twisting."""
-    start = free[-1]
-    if twisting.saddle is not None:
-        start = free[twisting.saddle]
+    end, saddle = twisted.free[-1], twisted.barriers.saddle
+    start = end if saddle is None else twisted.free[saddle]
     if start.index() == 1:
         yield start, True
     else:
-        modes = downhill_modes(start)
-        for along in modes:
-            for down in modes:
-                if down is along:
-                    continue
-                for sign in (1.0, -1.0):
-                    reached = climb(start, along, kick=_along(start, sign * down, _KICK))
-                    if reached is not None and reached.is_saddle:
-                        yield reached.free, False
-                        break  # of two that mirror each other one is enough
-    end = free[-1]
+        for along, down in permutations(downhill_modes(start), 2):
+            for sign in (1.0, -1.0):
+                reached = climb(start, along, kick=_along(start, sign * down, _KICK))
+                if reached is not None and reached.is_saddle:
+                    yield reached.free, False
+                    break  # of two that mirror each other one is enough
     _, soft = end.system.softest_modes(end.state, _SOFTEST)
     for mode in soft:
         reached = climb(end, mode, kick=_along(end, mode, _KICK))
@@ -189,12 +189,8 @@ def _along(free: FreeRing, mode: Array, size: float) -> Array:
     return size * math.sqrt(float(free.rod.length.sum())) * mode
 
 
-def _energy(free: FreeRing) -> float:
-    return free.polished().energy
-
-
 def _described(free: FreeRing, energy: float, ends: dict[str, float], *, twisted: bool) -> _Found:
-    """A saddle with what can be said about it, after going down both sides."""
+    """The record of a saddle, and the flows down its two sides."""
     values, modes = free.system.softest_modes(free.state, 3)
     down = int(np.argmin(values))
     sides = tuple(
@@ -208,20 +204,12 @@ def _described(free: FreeRing, energy: float, ends: dict[str, float], *, twisted
         for sign in (1.0, -1.0)
     )
     names = tuple(name_of_rest(side, ends) for side in sides)
-    saddle = Saddle(
-        energy,
-        free.index(),
-        free.residual,
-        free.zero_modes,
-        twisted,
-        names,
-        float(values[down]),
-    )
-    return _Found(saddle, free, sides)
+    known = (energy, free.index(), free.residual, free.zero_modes)
+    return _Found(Saddle(*known, twisted, names, float(values[down])), free, sides)
 
 
 def name_of_rest(side: EndState, ends: Mapping[str, float]) -> str:
-    """Which rest a flow has come to."""
+    """Name of the state in which a flow ends."""
     if not side.rests:
         return "nowhere"
     alike = ALIKE * abs(ends["folded"])
@@ -231,8 +219,8 @@ def name_of_rest(side: EndState, ends: Mapping[str, float]) -> str:
     return f"another rest, U = {side.energy:.6g}"
 
 
-def _way(best: _Found) -> tuple[Array, Array]:
-    """Progress and energy from flat over the saddle to folded, and shapes on the way."""
+def _path_over(best: _Found) -> tuple[Array, Array]:
+    """Progress and energy from flat over the saddle to folded, and shapes on the path."""
     flat, folded = best.sides if best.saddle.ends[0] == "flat" else best.sides[::-1]
     states: list[State] = [*flat.history[::-1], best.free.state, *folded.history]
     energies = np.concatenate([flat.energies[::-1], [best.saddle.energy], folded.energies])

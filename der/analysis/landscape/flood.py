@@ -1,9 +1,9 @@
-"""Minima over a grid of twist and grip distance, carried from cell to cell until nothing is new.
+"""Minima over a grid of twist and grip distance, by a flood fill.
 
-From a minimum in one cell, Newton's method looks for one in each of the four cells beside it; where
-that leads to no minimum, dynamic relaxation does. What is new to its cell spreads on in turn: each
-cell is reached in several directions, and sheets of minima that join somewhere are all found. A
-sheet of its own is met only by chance: minima are shaken along their softest modes for that.
+From a minimum in one cell, Newton's method looks for a minimum in each of the four neighbour cells;
+if it finds none, dynamic relaxation is used. A minimum that is new to its cell spreads further in
+turn. Each cell is reached from several directions, so all sheets of minima that are connected are
+found. To find separate sheets, minima are also displaced far along their softest modes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from der.utils.run import Run
 MOST_MINIMA = 6  # in one cell
 _SAME = 1e-6  # rad, root mean square: two minima that are one
 _NEAR = 0.5  # rad, likewise: a neighbour on the same sheet
-_PARTS = (1, 4)  # of the way to a neighbour, before the state is relaxed
+_PARTS = (1, 4)  # steps to a neighbour, tried before relaxation
 _RELAXED = 1e-6  # GJ/a, residual at which Newton's method takes over
 _MOST_GRADIENTS = 3000
 _SHAKE = 1.0  # rad, root mean square
@@ -46,20 +46,20 @@ class Minimum:
 
 @dataclass
 class Flood:
-    """The grid, what was found in its cells, and why nothing was."""
+    """The grid, the minima in its cells, and why some cells have none."""
 
     ring: GrippedRing
     supports: Supports
     gamma: Array
     distance: Array
     tolerance: float
-    ceiling: float  # energy above which a cell has one minimum at most, its lowest
+    ceiling: float  # energy above which only the lowest minimum of a cell is kept
     minima: dict[Cell, list[Minimum]] = field(default_factory=dict)
     reasons: dict[Cell, str] = field(default_factory=dict)
 
     @property
     def share(self) -> float:
-        """Of the grip distance that the sector spans."""
+        """Share of the grip distance that the sector spans."""
         return 0.5 if self.ring.name == "quarter" else 1.0
 
     def system(self, distance: float) -> RodSystem:
@@ -69,44 +69,39 @@ class Flood:
         return RodSystem(self.ring.rod, self.supports._replace(target=target))
 
     def solve(self, cell: Cell, start: State) -> Equilibrium | None:
-        """A minimum in ``cell`` from a state nearby; None, and the reason kept, without one."""
+        """Return a minimum in ``cell`` from a state nearby; None: none, and the reason is kept."""
         i, j = cell
         system = self.system(self.distance[j])
         for parts in _PARTS:
-            at = self._walked(cell, start, parts)
+            at = self._in_parts(cell, start, parts)
             if _is_minimum(at) and _apart(self.ring, start, at.state) < _NEAR:
                 return at
-        begin = _turned(system, start, self.gamma[i])
+        begin = system.at_load(start, self.gamma[i])
         end = relax(system, begin, tolerance=_RELAXED, most=_MOST_GRADIENTS)
         if end.rests:
             at = system.correct(end.state, tolerance=self.tolerance)
             if _is_minimum(at):
                 return at
-        if at.converged:
-            self.reasons[cell] = "only saddles were found here"
-        else:
-            self.reasons[cell] = f"no minimum was found from any neighbour: {at.advice}"
+        without = f"no minimum was found from any neighbour: {at.advice}"
+        self.reasons[cell] = "only saddles were found here" if at.converged else without
         return None
 
-    def _walked(self, cell: Cell, start: State, parts: int) -> Equilibrium:
-        """The equilibrium in ``cell`` by Newton's method, the way from a state in parts."""
+    def _in_parts(self, cell: Cell, start: State, parts: int) -> Equilibrium:
+        """The equilibrium in ``cell`` by Newton's method, in several equal steps from a state."""
         span = float(edges(self.ring.rod, start)[:, 2].sum()) / self.share
-        goal = (self.gamma[cell[0]], self.distance[cell[1]])
+        gammas = np.linspace(start.load, self.gamma[cell[0]], parts + 1)[1:]
+        distances = np.linspace(span, self.distance[cell[1]], parts + 1)[1:]
         state = start
-        for k in range(1, parts + 1):
-            gamma, distance = (
-                a + (b - a) * k / parts for a, b in zip((start.load, span), goal, strict=True)
-            )
-            system = self.system(goal[1] if k == parts else distance)
-            begin = _turned(system, state, goal[0] if k == parts else gamma)
-            at = system.correct(begin, tolerance=self.tolerance)
+        for gamma, distance in zip(gammas, distances, strict=True):
+            system = self.system(distance)
+            at = system.correct(state, value=float(gamma), tolerance=self.tolerance)
             if not at.converged:
                 break
             state = at.state
         return at
 
     def add(self, cell: Cell, at: Equilibrium) -> bool:
-        """Whether a minimum is new to its cell, which then has it."""
+        """Add a minimum to its cell; return whether it is new there."""
         known = self.minima.setdefault(cell, [])
         energy = self.ring.copies * at.energy
         if len(known) >= MOST_MINIMA or (known and energy > self.ceiling):
@@ -136,7 +131,7 @@ def spread(
     run: Run,
     progress: Callable[[float], object] | None,
 ) -> None:
-    """Fill the grid from states near some of its cells on, until no neighbour is new or Ctrl-C."""
+    """Fill the grid from states near some of its cells, until nothing is new, or Ctrl-C."""
     waiting: deque[tuple[Cell, Equilibrium]] = deque()
     for cell, state in seeds:
         if run.done:
@@ -151,7 +146,7 @@ def spread(
 
 
 def shaken(flood: Flood, across: int) -> Iterator[tuple[Cell, State]]:
-    """Minima of some cells, about ``across`` in each direction, kicked far along soft modes."""
+    """Minima of about ``across`` cells in each direction, displaced far along soft modes."""
     n, m = len(flood.gamma), len(flood.distance)
     root = float(np.sqrt(flood.ring.rod.length.sum()))
     for i, j in product(range(0, n, max(n // across, 1)), range(0, m, max(m // across, 1))):
@@ -167,12 +162,6 @@ def _try(flood: Flood, cell: Cell, start: State, waiting: deque[tuple[Cell, Equi
     at = flood.solve(cell, start)
     if at is not None and flood.add(cell, at):
         waiting.append((cell, at))
-
-
-def _turned(system: RodSystem, start: State, gamma: float) -> State:
-    """``start`` with the grips turned to ``gamma``, nothing else moved."""
-    turn = system.increment(load=float(gamma) - start.load)
-    return system.retract(start, turn).but(load=float(gamma))
 
 
 def _is_minimum(at: Equilibrium) -> bool:

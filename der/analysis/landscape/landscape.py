@@ -1,8 +1,9 @@
 """The energy landscape along the path of twisting: wells, saddles, and the barriers between them.
 
-With nothing turning the grips, U over gamma is the ring's landscape in one dimension: dU/dgamma is
-4 M, so it is level where M = 0. What it costs to fold the ring is the highest saddle between flat
-and folded above the flat ring; what it costs to open it, the same above the folded one.
+Without a moment on the grips, U over gamma is the landscape of the ring in one dimension: dU/dgamma
+is 4 M, so equilibria are where M = 0. The barrier to fold the ring is the energy of the highest
+saddle between flat and folded above the flat ring. The barrier to open it is its energy above the
+folded ring.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from der.rod.rod import edges
 from der.scene import Scene, meshes
 from der.utils.run import Run
 
-FARTHEST = 2.0 * math.pi  # rad; a path that gets there unfolded, or to its negative, does not fold
+FARTHEST = 2.0 * math.pi  # rad; a path that arrives here not folded, or at -2 pi, does not fold
 _MOST_STEPS = 600  # rings that fold do so in less than 150
 _NO_WELL = "the folded ring is no well: it opens by itself when its grips turn freely"
 
@@ -32,20 +33,20 @@ _NO_WELL = "the folded ring is no well: it opens by itself when its grips turn f
 def landscape(
     scene: Scene, *, progress: Callable[[float], object] | None = None, index_free: bool = True
 ) -> Landscape:
-    """Energy, rests and barriers along the path of twisting, until the ring is folded.
+    """Return energy, M = 0 states and barriers along the path of twisting, from flat to folded.
 
     Parameters
     ----------
-    scene : ring, section, mesh, ``save_at``, ``stability``, ``shapes`` and ``modes``; where the
-        path ends is not asked of it but of the ring.
+    scene : ring, section, mesh, ``save_at``, ``stability``, ``shapes`` and ``modes``; the path ends
+        where the ring is folded.
     progress : called with gamma [rad] after every state.
-    index_free : whether to compute the index of every rest with the grips removed.
+    index_free : whether to compute the index of every M = 0 state with the grips removed.
 
     Notes
     -----
-    A path that cannot be followed to its end, or is stopped by Ctrl-C, is a landscape as far as it
-    goes: see ``path.status`` and ``path.message``. With the scene's ``error_bars`` the barriers
-    are extrapolated, too.
+    If the path cannot be followed to its end, or Ctrl-C stops it, the landscape has the path so
+    far: see ``path.status`` and ``path.message``. With the scene's ``error_bars`` the barriers are
+    also extrapolated.
     """
     ring = ring_of(scene)
     targets = None if scene.save_at is None else tuple(scene.save_at)
@@ -62,11 +63,8 @@ def landscape(
         extrapolates = scene.error_bars and found.folded
         coarser = meshes(scene.n_edges, ring.name)[1:] if extrapolates else ()
         bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
-        coarse = [
-            landscape(replace(bare, n_edges=n), index_free=False)
-            for n in coarser
-            if not run.pressed
-        ]
+        each = (replace(bare, n_edges=n) for n in coarser if not run.pressed)
+        coarse = [landscape(one, index_free=False) for one in each]
     if run.status == "interrupted":
         return replace(found, path=run.marked(found.path))
     if not extrapolates:
@@ -75,7 +73,7 @@ def landscape(
 
 
 def bare_request(scene: Scene) -> Request:
-    """Return the path of twisting until the ring is folded, and nothing counted on it."""
+    """Return the request of the path of twisting until the ring is folded, without indices."""
     return Request(
         gamma_max=FARTHEST,
         until_folded=True,
@@ -118,7 +116,7 @@ def _found(
 
 
 def _heights(one: Landscape) -> dict[str, float | None]:
-    """What is extrapolated of a landscape."""
+    """The values of a landscape that are extrapolated."""
     found, flat, end = one.barriers, one.rests[0], one.rests[-1]
     gamma = None if found.saddle is None else one.rests[found.saddle].gamma
     return {
@@ -131,10 +129,10 @@ def _heights(one: Landscape) -> dict[str, float | None]:
 
 
 def _without_mesh(one: Landscape, sure: Extrapolated) -> Landscape:
-    """A landscape with what it is on a mesh without end.
+    """A landscape with its extrapolated values.
 
-    The threshold of stability rises with the number of edges: between two of them the folded ring
-    is a well on the mesh and none without it.
+    The threshold of stability rises with the number of edges. Close to it the folded ring is a well
+    on the mesh, but not in the limit.
     """
     values = dict(sure)
     if "open" in values and values.get("slope", (1.0, 0.0))[0] <= 0.0:
@@ -146,7 +144,7 @@ def _without_mesh(one: Landscape, sure: Extrapolated) -> Landscape:
 
 
 def barriers(rests: Sequence[Rest], *, folded: bool, message: str = "") -> Barriers:
-    """Barriers between the first of the rests, flat, and the last, where that is ``folded``."""
+    """Return the barriers between the first M = 0 state, flat, and the last, if ``folded``."""
     if not folded:
         reason = message or f"twisted up to {FARTHEST / math.pi:g} pi the ring does not fold"
         return Barriers(None, None, None, {"fold": reason, "open": reason})
@@ -180,7 +178,7 @@ def distance(ring: GrippedRing, at: Equilibrium) -> float:
 def rest_of(
     ring: GrippedRing, full: GrippedRing | None, one: Point[Equilibrium], position: int
 ) -> Rest:
-    """Return what is known of an equilibrium without load; ``full``: the full ring."""
+    """Return the record of an equilibrium without load; ``full``: the full ring."""
     at, index = one.solution, total_index(ring, one.index)
     slope = ring.arm_moment(at.slope)
     return Rest(

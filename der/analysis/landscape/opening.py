@@ -1,10 +1,10 @@
-"""The push that opens a folded ring with the least work: a pair of forces, or of couples.
+"""The loading of least work that opens a folded ring: a pair of forces, or of couples.
 
-Pairs of points on a grid are tried, each with all its tools (`landscape_tools`); of pairs that a
-symmetry of the folded ring maps onto each other one. Between the points of the grid the search goes
-on around the best of each kind. A slow push of prescribed length or angle cannot take less than
-the barrier of the ring left free (`landscape_march`): one that takes just that is the best there
-can be, whatever else was tried.
+All actuators (`actuators`) are tried at the pairs of points on a grid. Of pairs that a symmetry of
+the folded ring maps onto each other, one is tried. Then the search continues between the points of
+the grid, around the best of each kind. Slow loading by a prescribed length or angle cannot take
+less work than the barrier of the free ring (`opening_path`). A loading that takes just this work is
+therefore the best possible.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from der.analysis.landscape.barrier import barrier, twisted_rests
+from der.analysis.landscape.barrier import barrier, twisted_states
 from der.analysis.landscape.opening_search import Search, refine, scan
 from der.analysis.path_record import mesh_numerics
 from der.analysis.request import ring_of
@@ -27,7 +27,7 @@ from der.utils.checks import Array
 from der.utils.run import Run
 
 _GRIDS = (24, 16, 12, 8)  # points on the ring: the first that divides the edges
-_NOT_WORTH = (3.0, 1.1)  # times the free barrier, or that of twisting: more is not followed
+_NOT_WORTH = (3.0, 1.1)  # times the free barrier, or that of twisting: largest work followed
 
 
 def least_push(
@@ -37,58 +37,56 @@ def least_push(
     between: bool = True,
     progress: Callable[[float], object] | None = None,
 ) -> LeastPush:
-    """The pairs of forces and of couples that push a folded ring open with the least work.
+    """Return the pairs of forces and of couples that open a folded ring with the least work.
 
     Parameters
     ----------
-    scene : ring, section and mesh; how it is controlled does not matter.
-    points : on the ring, of the grid of pairs; a divisor of the edges, at least 3. None: 24, 16, 12
+    scene : ring, section and mesh; its control does not matter.
+    points : number of grid points on the ring; a divisor of the edges, at least 3. None: 24, 16, 12
         or 8.
-    between : whether to go on between the points of the grid, around the best of each kind.
+    between : whether to search between the points of the grid, around the best of each kind.
     progress : called with the share of the grid's pairs that were tried.
 
     Raises
     ------
     ValueError
-        For a grid that the mesh does not have.
+        If ``points`` does not divide the edges.
 
     Notes
     -----
-    Where the folded ring is no well there is nothing to push: ``why`` says so, and ``status`` where
-    not even the flat ring is at rest. With the scene's
-    ``error_bars`` works are extrapolated, too; the search then stays on points of the coarsest
-    mesh. Ctrl-C keeps the pushes found so far.
+    If the folded ring is no well, nothing is tried: ``why`` says so, and ``status`` if not even the
+    flat ring is an equilibrium. With the scene's ``error_bars`` the works are also extrapolated;
+    the search then uses points of the coarsest mesh only. Ctrl-C keeps the results found so far.
     """
     grid = _grid(scene, points)
+    extrapolated: Extrapolated = {}
     with Run() as run:
         free = barrier(replace(scene, error_bars=False))
         search, why = _begun(scene, free)
-        status = free.status
-        if search is not None and not run.pressed:
+        if not why and not run.pressed:
             scan(search, grid, run, progress)
             if between:
                 refine(search, scene.n_edges // grid, free.open, run)
-        sure: Extrapolated = {}
-        if search is not None and scene.error_bars and not run.pressed:
-            sure = _without_mesh(search, free)
-    if search is not None and not why and not any(push.opens for push, _ in search.all):
+        if not why and scene.error_bars and not run.pressed:
+            extrapolated = _extrapolated(search, free)
+    if not why and not any(push.opens for push, _ in search.all):
         why = "no push was found that opens the ring"
     if run.pressed:
         why = "stopped by the user before all pairs of points were tried"
     return LeastPush(
-        status="interrupted" if run.pressed else status,
+        status="interrupted" if run.pressed else free.status,
         why=why,
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
         numerics=mesh_numerics(scene, ring_of(scene, "full")) | {"points": grid},
         barrier=free.open,
         twisting=free.twisting.open,
-        least=search.least(dead=False) if search is not None else {},
-        least_dead=search.least(dead=True) if search is not None else {},
-        extrapolated=sure,
-        pushes=tuple(push for push, _ in search.all) if search is not None else (),
+        least=search.least(dead=False),
+        least_dead=search.least(dead=True),
+        extrapolated=extrapolated,
+        pushes=tuple(push for push, _ in search.all),
         timing=SolveTime(run.seconds),
-        shapes=_shapes(search) if search is not None else {},
+        shapes=_shapes(search),
     )
 
 
@@ -101,43 +99,36 @@ def _grid(scene: Scene, points: int | None) -> int:
     return points
 
 
-def _begun(scene: Scene, free: Pass) -> tuple[Search | None, str]:
-    """The folded ring to be pushed; None and a sentence where it is no well."""
-    rests, states, _, why = twisted_rests(scene)
-    if why:
-        return None, why
-    end = rests[-1]
-    if end.index_free != 0:
-        index = "unknown" if end.index_free is None else str(end.index_free)
-        return None, f"the free folded ring is no well; its index is {index}"
+def _begun(scene: Scene, free: Pass) -> tuple[Search, str]:
+    """The search on a folded ring, and why there is none: the ring is no well."""
+    twisted = twisted_states(scene)
+    if twisted.no_well:
+        return Search(scene, None, {}, 0.0), twisted.no_well
     heights = zip(_NOT_WORTH, (free.open, free.twisting.open), strict=True)
-    known = [times * height for times, height in heights if height]
-    most = max(known, default=np.inf)
-    ends = {"flat": rests[0].energy, "folded": end.energy}
-    return Search(scene, states[-1], ends, most), ""
+    most = max((times * height for times, height in heights if height), default=np.inf)
+    return Search(scene, twisted.free[-1], twisted.ends, most), ""
 
 
-# --- What is written -------------------------------------------------------------------------
+# --- The record ------------------------------------------------------------------------------
 
 
 def _shapes(search: Search) -> dict[str, tuple[Array, Array]]:
-    """The ring at the moments that matter, and where it is pushed."""
+    """The ring where each best loading ends, and the two points where it is loaded."""
     found = {}
-    for dead in (False, True):
-        for kind, k in search.least(dead=dead).items():
-            _, done = search.all[k]
-            moment = done.dead if dead else done.last
-            if moment is not None:
-                found[f"{kind} dead" if dead else kind] = done.actuator.shape(moment.state)
+    for name, k, dead in search.best():
+        _, done = search.all[k]
+        instant = done.dead if dead else done.last
+        if instant is not None:
+            found[name] = done.actuator.shape(instant.state)
     return found
 
 
-def _without_mesh(search: Search, free: Pass) -> Extrapolated:
-    """Works and loads of the best pushes, extrapolated from the same ones on coarser meshes."""
+def _extrapolated(search: Search, free: Pass) -> Extrapolated:
+    """Works and loads of the best loadings, extrapolated from the same ones on coarser meshes."""
     levels = [_works(search, search, 1)]
     for times, n in zip((2, 4), meshes(search.scene.n_edges, "full")[1:], strict=True):
-        coarse, _ = _begun(replace(search.scene, n_edges=n, error_bars=False), free)
-        if coarse is None:
+        coarse, why = _begun(replace(search.scene, n_edges=n, error_bars=False), free)
+        if why:
             return {}
         coarse.most = np.inf
         levels.append(_works(search, coarse, times))
@@ -145,22 +136,18 @@ def _without_mesh(search: Search, free: Pass) -> Extrapolated:
 
 
 def _works(search: Search, level: Search, times: int) -> dict[str, float | None]:
-    """Works and loads of the best pushes of ``search``, on a mesh that is coarser by ``times``."""
+    """Works and loads of the best loadings of ``search``, on a mesh coarser by ``times``."""
     found: dict[str, float | None] = {}
-    for dead in (False, True):
-        for kind, k in search.least(dead=dead).items():
-            best = search.all[k][0]
-            name = f"{kind} dead" if dead else kind
-            pair = (best.edges[0] // times, best.edges[1] // times)
-            same = [
-                one
-                for one, _ in (level.at(pair) if not any(e % times for e in best.edges) else [])
-                if (one.kind, one.direction) == (best.kind, best.direction)
-            ]
-            instant = (same[0].dead if dead else same[0].held) if same else None
-            wanted = best.dead if dead else best.held
-            alike = instant is not None and wanted is not None and instant.event == wanted.event
-            found[name] = instant.work if instant is not None and alike else None
-            if dead:
-                found[f"{name} load"] = instant.load if instant is not None and alike else None
+    for name, k, dead in search.best():
+        best = search.all[k][0]
+        pair = (best.edges[0] // times, best.edges[1] // times)
+        tried = [] if any(edge % times for edge in best.edges) else level.at(pair)
+        kind = (best.kind, best.direction)
+        same = next((one for one, _ in tried if (one.kind, one.direction) == kind), None)
+        instants = [one.dead if dead else one.held for one in (best, same) if one is not None]
+        wanted, instant = instants[0], instants[1] if same is not None else None
+        alike = instant is not None and wanted is not None and instant.event == wanted.event
+        found[name] = instant.work if instant and alike else None
+        if dead:
+            found[f"{name} load"] = instant.load if instant and alike else None
     return found

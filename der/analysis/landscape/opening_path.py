@@ -1,25 +1,24 @@
-"""Opening of a folded ring by a growing push, from minimum to minimum.
+"""Opening of a folded ring by an actuator, from minimum to minimum.
 
-The push, a length or an angle, grows from that of the folded ring. What may happen on the way:
+The push of the actuator, a length or an angle, grows from that of the folded ring. Events:
 
-    pass    the force is back at 0: the ring has been carried to where it goes on without a push
+    pass    the force returns to 0: beyond, the free ring moves on without a push
     fold    the push turns back: the minimum ceases to exist, and the ring snaps
     branch  the minimum becomes a saddle, by a mode that breaks its symmetry
-    end     the actuator has no more room
+    end     the actuator has reached its largest push
 
-From a fold or a branch point the ring snaps at the push as it is, down its energy. There and at a
-pass it is released: where it then comes to rest decides whether it has been opened. If it folds up
-again, pushing goes on from where the ring rests in its actuator. Work is what that has done
-in all: the sum of the rises of U between the snaps.
+From a fold or a branch point the ring snaps at constant push to a state of less energy. There, and
+at a pass, it is also released. The end state of the released ring decides whether the ring is open.
+If it folds again, loading continues from the end state in the actuator. The work is the sum of the
+increases of U between the snaps.
 
-On its way from folded to flat U has been as high as the lowest pass between them at least, and the
-actuator has paid for it, since in all snaps U only sinks. **A slow push of prescribed length or
-angle takes at least the work of the free barrier**, and just that where it leads to the pass.
+Between folded and flat, U is at least as high as the lowest pass between them. The actuator has
+done this work, because U only decreases in snaps. **Slow loading by a prescribed length or angle
+takes at least the work of the free barrier**, and exactly this work if it leads to the pass.
 
-
-A dead load goes up to the limit of the force, dP/ds = 0, or to a landing under less of it. There
-the ring snaps under that load, and is then released. The work up to the limit may well be less than
-the barrier: on the way from there the load goes on working, so that it is more in all.
+A dead load grows up to the limit of the force, dP/ds = 0, or until the ring snaps to a state of
+smaller force. There the ring snaps under this load, and is then released. The work up to the limit
+may be less than the barrier: the load does more work during the snap.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from der.analysis.landscape.rest_states import without_moment
 from der.continuation.arclength import follow
 from der.continuation.events import Events
 from der.errors import ContinuationFailed
-from der.problem import Increment, Options, Point, Solution, Statistics
+from der.problem import Increment, Options, Point, Statistics
 from der.rod.dynamics import EndState, flow
 from der.rod.equilibrium import Equilibrium
 from der.rod.free_ring import balance
@@ -43,19 +42,19 @@ from der.rod.implicit_step import on_the_conditions
 from der.rod.rod import State
 from der.rod.system import RodSystem
 
-_KICK = 0.05  # rad, root mean square: off a fold or a branch point
+_KICK = 0.05  # rad, root mean square: from a fold or a branch point
 _NUDGE = 0.02  # rad, likewise: over a pass
-_PAST = 1e-4  # of the tool's room: how far past a branch point the ring is let fall
+_PAST = 1e-4  # of the largest push: distance behind a branch point at which the ring snaps
 _NOTHING = 1e-5  # of the largest force so far: at a pass, where the index may change, too
-_LOWER = 1e-6  # of the force: a landing under less is beyond what a dead load reaches
-_AT_REST = 1e-7  # GJ/a, largest force left after a fall
-_MOST_SNAPS = 8  # at the push as it is
+_LOWER = 1e-6  # of the force: an end state of smaller force is not reached by a dead load
+_AT_REST = 1e-7  # GJ/a, largest force left after a snap
+_MOST_SNAPS = 8  # at constant push
 _STEPS = 300
 
 
 @dataclass(frozen=True)
 class Instant:
-    """A point on the way to opening at which something happens."""
+    """A point of the loading with an event."""
 
     kind: str  # "pass", "fold", "branch", "limit" or "end"
     state: State
@@ -64,26 +63,26 @@ class Instant:
     energy: float
     work: float  # done by the actuator up to there, GJ/a
     index: tuple[int | None, int | None]  # before and after, the push held
-    lands: EndState | None = None  # where the ring comes to rest once it is released
+    lands: EndState | None = None  # end state of the released ring
 
 
 @dataclass
 class Opening:
-    """What a push has come to so far."""
+    """Loading by one actuator, so far."""
 
     actuator: Actuator
     folded: float  # energy of the folded ring
-    alike: float  # by how much that of the same one may differ
+    alike: float  # energies that differ by less belong to one state
     options: Options
-    most: float  # work beyond which it is not followed
+    most: float  # work beyond which loading is not followed
     statistics: Statistics = field(default_factory=Statistics)
     line: list[tuple[float, float, float]] = field(default_factory=list)  # push, force, energy
     work: float = 0.0
     peak: float = 0.0  # largest force
-    snaps: int = 0  # at the push as it is
+    snaps: int = 0  # at constant push
     last: Instant | None = None
     dead: Instant | None = None  # the limit of a dead load
-    why: str = ""  # a sentence where it could not go on
+    why: str = ""  # a sentence if loading could not continue
 
     @property
     def system(self) -> RodSystem:
@@ -104,13 +103,14 @@ def opened(
     tolerance: float = 1e-10,
     most: float = np.inf,
 ) -> Opening:
-    """Push a ring until it is opened, the actuator has no more room, or no minimum follows.
+    """Load a ring until it opens, the actuator reaches its end, or no minimum follows.
 
     Parameters
     ----------
-    folded, alike : energy of the folded ring, and by how much that of the same one may differ.
+    folded : energy of the folded ring.
+    alike : energies that differ by less belong to one state.
     tolerance : of the residual of an equilibrium, GJ/a.
-    most : work beyond which the push is not followed.
+    most : work beyond which loading is not followed.
     """
     options = Options(tolerance=tolerance, max_steps=_STEPS)
     done = Opening(actuator, folded, alike, options, most)
@@ -121,12 +121,12 @@ def opened(
 
 
 def _pushed(done: Opening, start: State) -> State | None:
-    """Minima from one state of the ring in its actuator on; where to go on from, if anywhere."""
-    begin = done.folded  # what a strut has cost that starts between points in one place counts, too
+    """Follow the minima from one state of the ring in its actuator; return where to continue."""
+    begin = done.folded  # the work to place a strut between coincident points counts, too
     before: Point[Equilibrium] | None = None
     came: Equilibrium | None = None
     try:
-        for one in _until_something(done, start):
+        for one in _until_event(done, start):
             at = one.solution
             if before is None and done.line:
                 begin = at.energy
@@ -143,7 +143,7 @@ def _pushed(done: Opening, start: State) -> State | None:
     except ContinuationFailed as failed:
         done.why = str(failed)
     if before is None:
-        done.why = "the state from which it has to go on cannot be solved for"
+        done.why = "the state from which loading continues cannot be solved for"
         return None
     done.work += before.solution.energy - begin
     done.last = _instant(before, done.work)
@@ -151,7 +151,7 @@ def _pushed(done: Opening, start: State) -> State | None:
 
 
 def _after(done: Opening, one: Point[Equilibrium], came: Equilibrium | None) -> State | None:
-    """Where to go on from after the last point of a path, if anywhere."""
+    """Return the state from which loading continues after the last point of a path, if any."""
     assert done.last is not None
     if done.why or done.last.kind == "end":
         if done.last.index[0] not in (0, None):
@@ -163,8 +163,8 @@ def _after(done: Opening, one: Point[Equilibrium], came: Equilibrium | None) -> 
     return _snapped(done, done.last, one)
 
 
-def _until_something(done: Opening, start: State) -> Iterator[Point[Equilibrium]]:
-    """Minima at a growing push, the last one that at which something happens."""
+def _until_event(done: Opening, start: State) -> Iterator[Point[Equilibrium]]:
+    """Minima at a growing push, the last one with an event."""
     system, before, peak = done.system, None, done.peak
     for one in follow(
         system, start, _events(done.actuator), options=done.options, statistics=done.statistics
@@ -185,33 +185,25 @@ def _until_something(done: Opening, start: State) -> Iterator[Point[Equilibrium]
 
 
 def _events(actuator: Actuator) -> Events[State]:
-    """What is looked for while the actuator pushes."""
+    """Events of the loading."""
     ends = (-actuator.load_max, actuator.load_max)
-
-    def stop(at: Solution[State]) -> bool:
-        return at.parameter in ends
-
-    return Events(targets=ends, stop=stop, limits=("moment",), stability=True)
+    return Events(
+        targets=ends, stop=lambda at: at.parameter in ends, limits=("moment",), stability=True
+    )
 
 
 def _instant(one: Point[Equilibrium], work: float) -> Instant:
     before, after = one.sides or (one.index, one.index)
+    index = (before[0] if before else None, after[0] if after else None)
     at = one.solution
-    return Instant(
-        one.kind or "end",
-        at.state,
-        at.parameter,
-        at.moment,
-        at.energy,
-        work,
-        (before[0] if before else None, after[0] if after else None),
-    )
+    values = (at.parameter, at.moment, at.energy, work)
+    return Instant(one.kind or "end", at.state, *values, index)
 
 
 def _snapped(done: Opening, last: Instant, one: Point[Equilibrium]) -> State | None:
-    """Where the ring comes to rest in its actuator after a fold or a branch point.
+    """Snap to the end state in the actuator after a fold or a branch point.
 
-    Return the state to go on from, if the ring, released there, folds up again.
+    Return it if the ring, released there, folds again: loading continues from it.
     """
     at, system = one.solution, done.system
     if one.kind == "fold":
@@ -220,24 +212,24 @@ def _snapped(done: Opening, last: Instant, one: Point[Equilibrium]) -> State | N
     else:
         landed = _past_branch(done, at)
     done.last = last = replace(last, lands=_released(done.actuator, landed.state))
-    falls = landed.energy < at.energy or landed.moment < (1.0 - _LOWER) * at.moment
-    if done.dead is None and falls:
+    lower = landed.energy < at.energy or landed.moment < (1.0 - _LOWER) * at.moment
+    if done.dead is None and lower:
         done.dead = _under_dead_load(done, last, landed.state)
     if done.opens(last):
         return None
     done.snaps += 1
     if not landed.rests or done.snaps == _MOST_SNAPS:
-        done.why = f"the ring came to no rest in its actuator, at a push of {at.parameter:.6g}"
+        done.why = f"the ring did not come to rest in its actuator, at a push of {at.parameter:.6g}"
         return None
     return landed.state
 
 
 def _carry_over(done: Opening, last: Instant, came: Equilibrium, at: Equilibrium) -> None:
-    """Release the ring just past a pass, further along the way it came; pushing has ended."""
+    """Release the ring just past a pass, further along its path; loading has ended."""
     system = done.system
     free = done.actuator.released(at.state)
     index = balance(done.actuator.rod, free.quat, free.stretch).index()
-    # not the tangent: where material may shift at no cost, there are two of them
+    # not the tangent: if material may shift without energy, there are two of them
     jump = system.difference(came.state, at.state)
     jump[-1] = 0.0
     size = _NUDGE / float(np.sqrt(system.inner(jump, jump)))
@@ -247,22 +239,22 @@ def _carry_over(done: Opening, last: Instant, came: Equilibrium, at: Equilibrium
 
 
 def _released(actuator: Actuator, state: State) -> EndState:
-    """Where a ring comes to rest whose actuator is taken away."""
+    """End state of a ring whose actuator is removed."""
     free = RodSystem(actuator.rod, free_supports(actuator.rod))
     return flow(free, actuator.released(state), tolerance=_AT_REST)
 
 
 def _kick(system: RodSystem, at: Equilibrium, size: float, *, load: float) -> Increment:
-    """Displacement along the path, of its load too where ``load`` is 1."""
+    """Displacement along the path; its load moves, too, if ``load`` is 1."""
     kick = system.displacement(at.tangent, size)
     kick[-1] *= load
     return kick
 
 
 def _past_branch(done: Opening, at: Equilibrium) -> EndState:
-    """Where the ring comes to rest in its actuator shortly past a branch point.
+    """End state of the ring in its actuator shortly past a branch point.
 
-    The actuator goes so far before the ring snaps, and that is work, too.
+    The actuator moves to there before the ring snaps, and does work.
     """
     system = done.system
     past = system.retract(at.state, system.increment(load=_PAST * done.actuator.load_max))
@@ -271,22 +263,13 @@ def _past_branch(done: Opening, at: Equilibrium) -> EndState:
     done.work += on.energy - at.energy if on.converged else at.moment * further
     _, (mode,) = system.softest_modes(at.state)
     size = _KICK / float(np.sqrt(np.sum(system.rod.mass * mode**2)))
-    ways = [system.increment(sign * size * mode) for sign in (1.0, -1.0)]
-
-    def energy(way: Increment) -> float:
-        start = system.retract(past, way)
-        return on_the_conditions(system.rod, system.supports, start).energy
-
-    return flow(system, past, kick=min(ways, key=energy), tolerance=_AT_REST)
+    kicks = [system.increment(sign * size * mode) for sign in (1.0, -1.0)]
+    lower = min(kicks, key=lambda one: on_the_conditions(system, system.retract(past, one)).energy)
+    return flow(system, past, kick=lower, tolerance=_AT_REST)
 
 
 def _under_dead_load(done: Opening, limit: Instant, start: State) -> Instant:
-    """The limit of a dead load, with where the ring rests that snaps under it and is released."""
-    end = flow(
-        done.system,
-        start,
-        moment=limit.force,
-        stops=(-np.inf, done.actuator.load_max),
-        tolerance=_AT_REST,
-    )
+    """The limit of a dead load, with the end state of the ring that snaps under it."""
+    stops = (-np.inf, done.actuator.load_max)
+    end = flow(done.system, start, moment=limit.force, stops=stops, tolerance=_AT_REST)
     return replace(limit, lands=_released(done.actuator, end.state))

@@ -1,7 +1,7 @@
-"""The search for the push of least work: pairs of points, with all actuators at each.
+"""The search for the loading of least work: pairs of points, with all actuators at each.
 
-On a grid first, and of pairs that a symmetry of the folded ring maps onto each other one; then
-between the points of the grid, around the best of each kind.
+It starts on a grid, with one of the pairs that a symmetry of the folded ring maps onto each other.
+Then it continues between the points of the grid, around the best of each kind.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ from der.rod.free_ring import FreeRing
 from der.scene import Scene
 from der.utils.run import Run
 
-_UNIFORM = 1e-9  # of cells and natural strains that are alike
-_COARSER = 4  # a point that stands on a mesh of N/4 edges, too, as error bars need it
+_UNIFORM = 1e-9  # of cells and natural strains that are equal
+_COARSER = 4  # edges between points that a mesh of N/4 edges has, too, as error bars need
 
 Pair = tuple[int, int]
 
 
 @dataclass
 class Search:
-    """A folded ring, and what pushing it has come to so far."""
+    """A folded ring, and the loadings tried so far."""
 
     scene: Scene
-    folded: FreeRing
-    ends: dict[str, float]  # energies of the rests, by name
-    most: float  # work beyond which a push is not followed
+    folded: FreeRing | None  # None: it is no well, and nothing is tried
+    ends: dict[str, float]  # energies of the flat and folded ring
+    most: float  # work beyond which a loading is not followed
     found: dict[Pair, list[tuple[Push, Opening]]] = field(default_factory=dict)
 
     def at(self, pair: Pair) -> list[tuple[Push, Opening]]:
-        """What all actuators come to at one pair of points."""
-        if pair not in self.found:
+        """Results of all actuators at one pair of points."""
+        if pair not in self.found and self.folded is not None:
             energy = self.ends["folded"]
             self.found[pair] = []
             for actuator in struts(self.folded, pair) + wrenches(self.folded, pair):
@@ -61,14 +61,20 @@ class Search:
         return [one for several in self.found.values() for one in several]
 
     def least(self, *, dead: bool) -> dict[str, int]:
-        """Positions of the least pushes, by kind."""
+        """Positions of the loadings of least work, by kind."""
         pushes = [push for push, _ in self.all]
         places = {kind: least_of(pushes, kind, dead=dead) for kind in KINDS}
         return {kind: k for kind, k in places.items() if k is not None}
 
+    def best(self) -> Iterator[tuple[str, int, bool]]:
+        """Name and position of each loading of least work, and whether its load is dead."""
+        for dead in (False, True):
+            for kind, k in self.least(dead=dead).items():
+                yield f"{kind} dead" if dead else kind, k, dead
+
 
 def scan(search: Search, grid: int, run: Run, progress: Callable[[float], object] | None) -> None:
-    """Try all actuators at the pairs of a grid; ``progress`` is told the share that is done."""
+    """Try all actuators at the pairs of a grid; ``progress`` is called with the share done."""
     pairs = list(_pairs(search, grid))
     for k, pair in enumerate(pairs):
         if run.pressed:
@@ -79,7 +85,7 @@ def scan(search: Search, grid: int, run: Run, progress: Callable[[float], object
 
 
 def _pairs(search: Search, grid: int) -> Iterator[Pair]:
-    """Pairs of edges on a grid, one of all that the ring's symmetries map onto each other."""
+    """Pairs of edges on a grid, one of those that a symmetry of the ring maps onto each other."""
     n = search.scene.n_edges
     stride = n // grid
     for i in range(0, n, stride):
@@ -90,6 +96,7 @@ def _pairs(search: Search, grid: int) -> Iterator[Pair]:
 
 def same_pair(search: Search, pair: Pair) -> Pair:
     """The first of the pairs that a symmetry of the folded ring maps onto each other."""
+    assert search.folded is not None
     n, rod = search.scene.n_edges, search.folded.rod
     i, j = pair
     if np.ptp(rod.cell) < _UNIFORM and np.all(np.ptp(rod.rest, axis=0) < _UNIFORM):
@@ -103,9 +110,9 @@ def same_pair(search: Search, pair: Pair) -> Pair:
 
 
 def refine(search: Search, stride: int, barrier: float | None, run: Run) -> None:
-    """Go on between the points of the grid, around the best of each kind.
+    """Search between the points of the grid, around the best of each kind.
 
-    A slow push that takes no more than the barrier cannot be bettered.
+    A slow loading that takes no more work than the barrier cannot be improved.
     """
     finest = _COARSER if search.scene.error_bars else 1
     while stride % (2 * finest) == 0:
@@ -116,15 +123,9 @@ def refine(search: Search, stride: int, barrier: float | None, run: Run) -> None
 
 
 def _descend(
-    search: Search,
-    kind: str,
-    stride: int,
-    barrier: float | None,
-    run: Run,
-    *,
-    dead: bool,
+    search: Search, kind: str, stride: int, barrier: float | None, run: Run, *, dead: bool
 ) -> None:
-    """From the best push of a kind to one next to it that is better, until there is none."""
+    """Replace the best loading of a kind by a better neighbour, until there is none."""
     before = None
     while not run.pressed:
         best = search.least(dead=dead).get(kind)
@@ -148,35 +149,26 @@ def _around(search: Search, pair: Pair, stride: int) -> list[Pair]:
 def _push(search: Search, done: Opening) -> Push:
     actuator = done.actuator
     if done.last is None:
-        raise ValueError("a push must have come somewhere, got none")
+        raise ValueError("a push must have at least one state, got none")
     s = ring_of(search.scene, "full").arc_length / search.scene.ring.length
-    energy = search.ends["folded"]
-    first, second, third = actuator.axis.tolist()
-    line = np.array(done.line)
     return Push(
         actuator.kind,
         (float(s[actuator.points[0]]), float(s[actuator.points[1]])),
         actuator.points,
         actuator.direction,
-        (first, second, third),
+        tuple(actuator.axis.tolist()),
         _instant(search, done.last),
         None if done.dead is None else _instant(search, done.dead),
         done.opens(done.last),
         done.opens(done.dead),
         done.peak,
         done.snaps,
-        np.column_stack([line[:, :2], line[:, 2] - energy]),
+        np.array(done.line) - [0.0, 0.0, search.ends["folded"]],
         done.why,
     )
 
 
 def _instant(search: Search, reached: Reached) -> Instant:
-    return Instant(
-        reached.kind,
-        reached.push,
-        reached.force,
-        reached.work,
-        reached.energy - search.ends["folded"],
-        *reached.index,
-        "" if reached.lands is None else name_of_rest(reached.lands, search.ends),
-    )
+    lands = "" if reached.lands is None else name_of_rest(reached.lands, search.ends)
+    values = (reached.push, reached.force, reached.work, reached.energy - search.ends["folded"])
+    return Instant(reached.kind, *values, *reached.index, lands)

@@ -1,4 +1,4 @@
-"""Barriers of a ring over the h/t of its section: one landscape, and one pass, each."""
+"""Barriers of a ring over the h/t of its section, from a landscape and a pass at each value."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def barriers_over(
 
     Parameters
     ----------
-    free : whether to look for the barriers of the free ring, too; takes ten times as long.
-    error_bars : whether to extrapolate from N, N/2 and N/4 edges, and say how sure that is.
+    free : whether to compute the barriers of the free ring, too; takes ten times as long.
+    error_bars : whether to extrapolate from N, N/2 and N/4 edges, with error bars.
     progress : called with h/t after every landscape.
 
     Notes
     -----
-    Ctrl-C keeps the values so far.
+    Ctrl-C keeps the values found so far.
     """
 
     def solved(value: float) -> _Row:
@@ -70,7 +70,7 @@ def barriers_over(
 
 
 class _Row(NamedTuple):
-    """What is known at one h/t."""
+    """The values at one h/t."""
 
     values: tuple[float, ...]  # h/t, and the columns of the record
     errors: tuple[float, ...]  # of `_BARRIERS`
@@ -80,39 +80,31 @@ class _Row(NamedTuple):
     @classmethod
     def of(cls, h_over_t: float, one: Landscape, free: Pass | None) -> _Row:
         """The row of a landscape, and of the barrier of the free ring."""
-        sentences = set(one.barriers.why.values()) | ({free.why} - {""} if free else set())
-        saddle = one.barriers.saddle
+        found, extrapolated = one.barriers, one.extrapolated
+        sentences = set(found.why.values()) | ({free.why} - {""} if free else set())
+        saddle = None if found.saddle is None else one.rests[found.saddle]
+        known = {
+            "fold": found.fold,
+            "open": found.open,
+            "gamma": None if saddle is None else saddle.gamma,
+            "folded": one.rests[-1].energy if one.folded else None,
+        }
+        if extrapolated:
+            known = {name: extrapolated.get(name, (None, None))[0] for name in known}
+        without = {} if free is None else free.extrapolated
+        own = {"fold": free.fold, "open": free.open} if free else {"fold": None, "open": None}
+        of_free = [without.get(name, (value, None))[0] for name, value in own.items()]
         return cls(
-            (h_over_t, *_twisting(one), *_free(free)),
-            (*_errors(one.extrapolated), *_errors(free.extrapolated if free else {})),
-            None if saddle is None else one.rests[saddle].index_free,
+            _numbers(h_over_t, *known.values(), *of_free),
+            (*_errors(extrapolated), *_errors(without)),
+            None if saddle is None else saddle.index_free,
             "; ".join(sorted(sentences)),
         )
 
 
-def _twisting(one: Landscape) -> tuple[float, ...]:
-    """Barriers to fold and to open, gamma of the saddle and energy of the folded ring, or NaN."""
-    found, sure = one.barriers, one.extrapolated
-    saddle = None if found.saddle is None else one.rests[found.saddle].gamma
-    energy = one.rests[-1].energy if one.folded else None
-    known = {"fold": found.fold, "open": found.open, "gamma": saddle, "folded": energy}
-    if sure:
-        known = {name: sure[name][0] if name in sure else None for name in known}
-    return _numbers(*known.values())
-
-
-def _free(found: Pass | None) -> tuple[float, ...]:
-    """Barriers of the free ring, or NaN."""
-    if found is None:
-        return _numbers(None, None)
-    known = {"fold": found.fold, "open": found.open}
-    known |= {name: value for name, (value, _) in found.extrapolated.items()}
-    return _numbers(*known.values())
-
-
-def _errors(sure: Extrapolated) -> tuple[float, ...]:
+def _errors(extrapolated: Extrapolated) -> tuple[float, ...]:
     """Errors of the barriers to fold and to open, or NaN."""
-    return tuple(sure.get(name, (np.nan, np.nan))[1] for name in ("fold", "open"))
+    return tuple(extrapolated.get(name, (np.nan, np.nan))[1] for name in ("fold", "open"))
 
 
 def _numbers(*values: float | None) -> tuple[float, ...]:

@@ -1,7 +1,7 @@
-"""Equilibria without load on a path, M = 0, each solved for: none is interpolated.
+"""Equilibria without load on a path, M = 0. All are solved for, none is interpolated.
 
-Limits of the moment are points of the path, so that M is monotonic between neighbours and one that
-changes its sign there has one root.
+Limits of the moment are points of the path, so M is monotonic between neighbours: where it changes
+sign there is one root.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ def with_rests(
     points: Sequence[Point[Equilibrium]],
     statistics: Statistics,
 ) -> tuple[list[Point[Equilibrium]], list[int]]:
-    """Return the points of a path with those at M = 0 put in, and the positions of these.
+    """Return the points of a path together with those at M = 0, and the positions of the latter.
 
     Raises
     ------
     ContinuationFailed
-        Where an equilibrium cannot be solved for within a step of the path.
+        If an equilibrium cannot be solved for within a step of the path.
     """
     rounding = _NO_MOMENT * max((abs(one.solution.moment) for one in points), default=0.0)
     line: list[Point[Equilibrium]] = []
@@ -51,7 +51,7 @@ def with_rests(
 
 
 def _without_load(one: Point[Equilibrium], rounding: float) -> bool:
-    """Whether a point is the flat or the folded ring, where no moment is left but rounding."""
+    """Whether a point is the flat or the folded ring, whose moment is 0 to rounding."""
     return one.solution.parameter in (0.0, math.pi) and abs(one.solution.moment) <= rounding
 
 
@@ -63,7 +63,7 @@ def without_moment(
     Raises
     ------
     ContinuationFailed
-        Where it cannot be solved for.
+        If it cannot be solved for.
     """
     step = between(system, a, b, tolerance=tolerance, statistics=statistics)
 

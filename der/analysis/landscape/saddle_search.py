@@ -1,10 +1,10 @@
 """Saddles of the free ring: uphill along one mode, downhill along all others.
 
 Eigenvector following (Cerjan and Miller 1981; Wales 1994). In the eigenbasis of the Hessian on the
-conditions Newton's step is -g/mu, which climbs where mu < 0 and descends where mu > 0. With its
-sign turned in the few modes in which that is not wanted, it climbs along the followed mode alone,
-and converges to a saddle of index 1 where Newton's method would go to whatever is next. One
-factorisation and the softest modes a step: O(N).
+conditions Newton's step is -g/mu: uphill if mu < 0, downhill if mu > 0. Here its sign is changed in
+the softest modes, so that it goes uphill along the followed mode alone. It then converges to a
+saddle of index 1, and not to any nearby equilibrium as Newton's method does. One step needs one
+factorisation and the softest modes: O(N).
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from der.rod.system import RodSystem
 
 _LONGEST = 0.05  # rad, root mean square, of a step; thin strips (h/t = 30) do not follow 0.1
 _NEARLY = 1e-5  # GJ/a, largest force: Newton's method takes over
-_SOFT = 0.02  # of the softest torsion, GJ (2 pi/L)^2: no step is longer than a mode this soft asks
+_SOFT = 0.02  # of the softest torsion, GJ (2 pi/L)^2: least stiffness that is used for a step
 _STEPS = 100
-_MODES = 5  # looked at in each step: more never point down on the way
+_MODES = 5  # computed in each step: never more are unstable on the path
 
 
 @dataclass(frozen=True)
 class Climb:
-    """Where following a mode has led."""
+    """The end of following a mode."""
 
     free: FreeRing
     solution: Equilibrium
@@ -44,7 +44,7 @@ class Climb:
 
 
 def climb(start: FreeRing, along: Array, *, kick: Array | None = None) -> Climb | None:
-    """The equilibrium that following a mode uphill leads to; None where it leads nowhere.
+    """Return the equilibrium reached by following a mode uphill; None: it reaches none.
 
     Parameters
     ----------
@@ -63,7 +63,8 @@ def climb(start: FreeRing, along: Array, *, kick: Array | None = None) -> Climb 
         if float(np.abs(grad).max()) < _NEARLY:
             return _polished(here, step)
         values, modes = system.softest_modes(here.state, _MODES)
-        # far from the saddle the followed mode is known by its shape, near to it as the only one
+        # far from the saddle the followed mode is recognised by its shape; near it, it is the only
+        # unstable one
         overlap = [abs(float(np.sum(here.rod.length[:, None] * mode * m))) for m in modes]
         chosen = int(np.argmax(overlap))
         if np.sum(values < 0.0) == 1:
@@ -127,13 +128,13 @@ def newton_step(system: RodSystem, here: FreeRing) -> tuple[Array, Array] | None
 
 
 def displaced(here: FreeRing, w: Array) -> FreeRing:
-    """A ring displaced by ``w`` (n, b), on its conditions again, with the best forces."""
+    """A ring displaced by ``w`` (n, b), back on its conditions, with forces of least residual."""
     system, supports, load = here.unpinned, here.supports, here.state.load
-    nothing = np.zeros(len(supports.target))
+    no_force = np.zeros(len(supports.target))
     state = system.retract(here.state, system.increment(w))
     free = supports.free.ravel()
     for _ in range(8):
-        found = assemble(here.rod, supports, state.quat, state.stretch, nothing, load)
+        found = assemble(here.rod, supports, state.quat, state.stretch, no_force, load)
         if float(np.abs(found.gap).max()) < 1e-12:
             break
         border = found.border.reshape(len(free), -1)[free]
@@ -144,7 +145,7 @@ def displaced(here: FreeRing, w: Array) -> FreeRing:
 
 
 def _polished(here: FreeRing, steps: int) -> Climb:
-    """The equilibrium next to it, and its index with all that it leaves free."""
+    """The nearby equilibrium, and its index."""
     at = here.polished()
     free = balance(here.rod, at.state.quat, at.state.stretch, here.supports, here.state.load)
     return Climb(free, at, free.index() if at.converged else None, steps)

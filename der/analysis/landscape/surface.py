@@ -1,11 +1,12 @@
 """The energy landscape over two coordinates: twist, and distance of the grips.
 
-On the path of twisting the grips slide as they like. Here their distance is prescribed, too: one
-more position condition, whose multiplier is the axial force. From the path on, minima spread over
-a grid (`flood`).
+On the path of twisting the grips slide freely. Here their distance is prescribed, too: one more
+position condition, whose multiplier is the axial force. From the path, minima spread over a grid
+(`flood`).
 
-Minima are those of the sector: of shapes with the symmetry of a ring in its grips. The index of
-the full ring, distance held, says where one of them can be left by breaking the symmetry.
+The minima are those of the sector, that is, of shapes with the symmetry of a ring in its grips. The
+index of the full ring at given distance tells which of them are unstable to modes that break this
+symmetry.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -23,14 +24,13 @@ from der.analysis.landscape.flood import Cell, Flood, shaken, spread
 from der.analysis.landscape.landscape import bare_request, distance
 from der.analysis.landscape.rest_states import with_rests
 from der.analysis.loading import follow_angle
-from der.analysis.path_record import mesh_numerics
+from der.analysis.path_record import mesh_numerics, run_entries
 from der.analysis.request import Request, ring_of
 from der.analysis.snap import Landing
 from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array
 from der.problem import Point, Statistics
 from der.records.energy_surface import NoMinimum, Surface
-from der.records.record import SolveTime
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import E3, GrippedRing
 from der.rod.rod import State
@@ -39,10 +39,10 @@ from der.rod.supports import Supports
 from der.scene import Scene
 from der.utils.run import Run
 
-STRETCHED = 0.97  # of half the ring's length: beyond, closing conditions lose their rank
-_CEILING = 1.5  # of the path's largest energy: other minima that lie higher are of no interest
+STRETCHED = 0.97  # of half the ring's length: beyond, the closing conditions lose their rank
+_CEILING = 1.5  # of the path's largest energy: only the lowest minimum of a cell may be higher
 _MARGIN = 0.25  # of the path's range of distances, on both sides of it
-_SHAKES = 6  # cells in each direction from which minima apart from the rest are looked for
+_SHAKES = 6  # cells in each direction from which separate sheets of minima are looked for
 _KEPT = 12  # gradients between kept configurations of a snap
 
 
@@ -55,15 +55,15 @@ def energy_surface(
     snaps: bool = True,
     progress: Callable[[float], object] | None = None,
 ) -> Surface:
-    """Least energy over twist and grip distance.
+    """Return the least energy over twist and grip distance.
 
     Parameters
     ----------
     scene : ring, section and mesh.
     shape : number of values of gamma and of the distance.
     gamma : values of gamma [rad]; None: from 0 to pi.
-    distance_range : smallest and largest distance [a]; None: those of the path, and some more.
-    snaps : whether to turn the grips up and down and keep the ways in which the ring snaps.
+    distance_range : smallest and largest distance [a]; None: those of the path with a margin.
+    snaps : whether to load and unload the ring by the angle, and keep the paths of its snaps.
     progress : called with the share of the cells that have a minimum.
 
     Raises
@@ -73,8 +73,8 @@ def energy_surface(
 
     Notes
     -----
-    Ctrl-C keeps what there is; see ``status``. A cell without a minimum has a sentence in
-    ``reasons``.
+    Ctrl-C keeps the cells found so far; see ``status``. A cell without a minimum has a sentence
+    in ``reasons``.
     """
     ring = ring_of(scene)
     if ring.name == "full":
@@ -83,7 +83,7 @@ def energy_surface(
     request = replace(bare_request(scene), targets=tuple(angles))
     with Run() as run:
         points = run.collect(request.follow(ring))
-        if run.status == "not converged":  # a surface around as much of the path as there is
+        if run.status == "not converged":  # a surface around the path found so far
             run.status, run.message = "done", f"the path of twisting: {run.message}"
         points, without_load = with_rests(ring, request, points, Statistics())
         line = np.array([_place(ring, one.solution) for one in points])
@@ -95,10 +95,7 @@ def energy_surface(
         spread(flood, shaken(flood, _SHAKES), run, progress)
         snapped = _snaps(ring, request, float(angles[-1]), run) if snaps and run.done else ()
     return Surface(
-        status=run.status,
-        message=run.message,
-        ring=scene.ring.to_json(),
-        section=asdict(scene.section),
+        **run_entries(scene, run),
         numerics=mesh_numerics(scene, ring) | {"shape": list(shape), "ceiling": flood.ceiling},
         gamma=angles,
         distance=flood.distance,
@@ -108,7 +105,6 @@ def energy_surface(
         folds=line[[k for k, one in enumerate(points) if one.kind == "fold"]],
         rests=line[without_load],
         snaps=snapped,
-        timing=SolveTime(run.seconds),
     )
 
 
@@ -129,7 +125,7 @@ def _place(ring: GrippedRing, at: Equilibrium) -> tuple[float, float, float]:
 def _range(
     scene: Scene, along_path: Array, given: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Distances to be looked at: those of the path with a margin, short of full stretch."""
+    """Range of distances: that of the path with a margin, below full stretch."""
     longest = 0.5 * scene.ring.length
     low, high = float(along_path.min()), float(along_path.max())
     margin = _MARGIN * max(high - low, 0.2 * scene.ring.length / math.pi)
@@ -156,7 +152,7 @@ def _maps(flood: Flood) -> dict[str, Any]:
     """Energy, moment, force and index of the lowest minimum in each cell, and all energies."""
     n, m = len(flood.gamma), len(flood.distance)
     energy, moment, force = (np.full((n, m), np.nan) for _ in range(3))
-    ways = np.full((n, m), -1, dtype=np.int64)
+    indices = np.full((n, m), -1, dtype=np.int64)
     ring = flood.ring
     for i, j in flood.minima:
         best = flood.among((i, j))[0]
@@ -164,17 +160,17 @@ def _maps(flood: Flood) -> dict[str, Any]:
         moment[i, j] = ring.arm_moment(best.solution.moment)
         # L holds + F (span - share d): dU/dd = -F share for each of the copies
         force[i, j] = -flood.share * ring.copies * best.solution.state.force[-1]
-        ways[i, j] = _index(ring, flood.system(flood.distance[j]).supports, best.solution.state)
+        indices[i, j] = _index(ring, flood.system(flood.distance[j]).supports, best.solution.state)
     levels = tuple(
         tuple(tuple(one.energy for one in flood.among((i, j))) for j in range(m)) for i in range(n)
     )
-    return {"energy": energy, "moment": moment, "force": force, "index": ways, "minima": levels}
+    return {"energy": energy, "moment": moment, "force": force, "index": indices, "minima": levels}
 
 
 def _index(ring: GrippedRing, supports: Supports, state: State) -> int:
-    """Index of the full ring with twist and distance held; -1 where it is not known.
+    """Index of the full ring with twist and distance held; -1: not known.
 
-    The arms no longer know of each other: modes in phase and out of phase are alike.
+    The arms are then independent: modes in phase and out of phase have the same stiffness.
     """
     total = 0
     for label, (multiplicity, modes) in ring.symmetry.items():
@@ -203,7 +199,7 @@ def _reasons(flood: Flood, status: str) -> tuple[NoMinimum, ...]:
 
 
 def _snaps(ring: GrippedRing, request: Request, last: float, run: Run) -> tuple[Array, ...]:
-    """Gamma, distance and energy along every snap on the way to the last angle and back."""
+    """Gamma, distance and energy along every snap of loading to the last angle and back."""
     asked = replace(request, gamma_max=last, until_folded=False, targets=())
     loading = follow_angle(ring, asked, Statistics(), unload=True, every=_KEPT)
     points: list[Point[Equilibrium]] = []

@@ -1,21 +1,22 @@
-r"""Deflated Newton's method: from one start to state after state.
+r"""Deflated Newton's method: several states from one initial guess.
 
 Newton's method finds the same equilibrium again and again. Deflation (Brown and Gearhart 1971;
-Farrell, Birkisson and Funke 2015) multiplies the residual F by a number that is infinite at every
-state y_k already known and tends to a constant far from all of them,
+Farrell, Birkisson and Funke 2015) multiplies the residual F by a factor that is infinite at every
+known state y_k and tends to a constant far from all of them,
 
     G(x) = eta(x) F(x),    eta = prod_k (1/d(x, y_k)^2 + 1).
 
-G has the roots of F but those known. Its Jacobian is that of F, eta J, plus a matrix of rank one,
-so that with Newton's own step D = -J^-1 F its step is (Sherman and Morrison; Farrell et al. 2.4)
+G has the roots of F except the known ones. Its Jacobian is eta J, with J that of F, plus a matrix
+of rank one. With Newton's step D = -J^-1 F of F, the step of G is (Sherman and Morrison; Farrell et
+al. 2.4)
 
     tau D,    tau = 1/(1 - slope),    slope = d(log eta)/dt along D,
 
-and needs nothing but a number, the slope, beyond the factors at hand. Near a state that is not
-known D is small, tau is 1 and convergence quadratic; near a known one slope is 2 and tau -1: the
-iteration is thrown back. The distance d is that of `states_images`, which no rigid motion, mirror
-or material shift changes: so a state is deflated together with all its images. The slope is a
-difference, as its error changes the way and not where it leads to.
+and needs only one more number, the slope. Near a state that is not known D is small, tau is 1 and
+convergence is quadratic. Near a known state the slope is 2 and tau is -1: the iteration moves away.
+The distance d is that of `symmetry_images`, which no rigid motion, reflection or material shift
+changes: a state is deflated together with all its images. The slope is a difference quotient; its
+error changes the iterates, but not their limit.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ LONGEST = 0.25  # rad, root mean square, of a step
 TOLERANCE = 1e-10  # GJ/a, of an equilibrium
 _STEPS = 60
 _NEARLY = 1e-5  # GJ/a, largest force: Newton's method takes over
-_NEARLY_RIGID = 0.01  # of a shift: how much more than a rigid rotation it is, beside a circle
+_NEARLY_RIGID = 0.01  # of a shift near a circle: its difference from a rigid rotation
 _SHORT = 1e-4  # rad, root mean square: a step below is Newton's own, tau = 1
 _PART = 1e-3  # of a step, over which its slope is taken
 _NO_DISTANCE = 1e-12
@@ -52,11 +53,11 @@ class Known:
 
 
 def factor(distances: Callable[[float], Array], *, power: float = 2.0, shift: float = 1.0) -> float:
-    """By how much deflation lengthens Newton's step.
+    """Return the factor tau by which deflation changes Newton's step.
 
     Parameters
     ----------
-    distances : of the states that are known, as a function of how much of the step is done.
+    distances : from the known states, as a function of the part of the step that is done.
     power, shift : of eta = prod (1/d^power + shift).
     """
 
@@ -68,7 +69,7 @@ def factor(distances: Callable[[float], Array], *, power: float = 2.0, shift: fl
 
 
 def deflated(start: FreeRing, known: Sequence[Known], images: Images) -> Known | None:
-    """A state that is not among the known ones, from a configuration; None where none is met."""
+    """Return a state not yet known, from a configuration; None: none was found."""
     here = start
     for _ in range(_STEPS):
         if not math.isfinite(here.residual):
@@ -105,16 +106,17 @@ def nearest(k: Signal, known: Sequence[Known], images: Images) -> Array:
 
 
 def settled(here: FreeRing, known: Sequence[Known], images: Images) -> Known | None:
-    """The equilibrium next to a configuration; None where there is none, or it is known."""
+    """Return the equilibrium next to a configuration; None: there is none, or it is known."""
     one = solved(here, images)
     return None if one is None or recognised(one, known, images) is not None else one
 
 
 def solved(here: FreeRing, images: Images) -> Known | None:
-    """The equilibrium next to a configuration, verified with all that its supports leave free.
+    """Return the equilibrium next to a configuration, verified on its own supports.
 
-    Beside a planar circle material shifts at next to no cost, in it that is a rigid rotation and no
-    motion of its own: what is held against it then stands in the way, so both are tried.
+    In a planar circle the shift of material is a rigid rotation; near a circle it is almost one,
+    and needs almost no energy. Holding an unknown against it may then prevent convergence, so both
+    supports are tried.
     """
     for supports in (here.pinned(), here.pinned(_NEARLY_RIGID)):
         at = RodSystem(here.rod, supports).correct(here.state, tolerance=TOLERANCE)
@@ -126,7 +128,7 @@ def solved(here: FreeRing, images: Images) -> Known | None:
 
 
 def recognised(one: Known, known: Sequence[Known], images: Images) -> int | None:
-    """Which of the known states it is, or an image of; None: none of them."""
+    """Return the position of the known state that it is, or an image of; None: it is new."""
     if not known:
         return None
     apart = nearest(one.images[0], known, images)

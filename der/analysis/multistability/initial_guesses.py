@@ -1,4 +1,4 @@
-r"""Where the search for states begins: shapes that are states of some ring, and those of twisting.
+r"""Initial guesses of the search for states: known planar shapes, and the states of twisting.
 
 A planar closed elastica is a circle, covered n times, or a figure eight (Euler 1744; Langer and
 Singer 1984), and natural curvature kappa0, uniform along the ring, changes nothing about that: in
@@ -7,11 +7,11 @@ In space the bar may be rolled about its own tangent by phi, k = n (cos phi, sin
 
     U'(phi) = 0:    sin phi = 0    or    cos phi = -alpha kappa0/((beta - alpha) n),
 
-the second being the tilted ring between a circle and the same turned inside out, its pass where
-beta > alpha. It exists while alpha |kappa0| < |beta - alpha| n, and where it ends, the circle
+where the second is the tilted ring between a circle and its inside-out image, the pass between them
+if beta > alpha. It exists if alpha |kappa0| < |beta - alpha| n. At the end of this range the circle
 flips: alpha (n - kappa0) = beta n, or the same with -n.
 
-On other rings all this is a first guess.
+For other rings these shapes are approximate.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from der.analysis.landscape.barrier import twisted_rests
+from der.analysis.landscape.barrier import twisted_states
 from der.analysis.landscape.landscape import bare_request
 from der.analysis.landscape.saddle_search import displaced
 from der.analysis.request import ring_of
-from der.continuation.roots import find_root
 from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array, turned
 from der.rod.free_ring import FreeRing, balance, released
 from der.rod.gripped_ring import GrippedRing
+from der.rod.planar_ring import eight_angles
 from der.scene import Scene
 
 _AS_IS = np.ones(4)
 _MIRRORED = np.array([1.0, 1.0, -1.0, -1.0])  # quaternions, across the plane of the flat ring
-_COVERED = 3  # times, or as often as the bar would like to
-_EDGES_A_COVER = 4  # at least
+_COVERED = 3  # times, or as often as the natural curvature has turns
+_EDGES_A_COVER = 4  # least edges on each cover
 
 
 def free_starts(scene: Scene, full: GrippedRing) -> Iterator[FreeRing]:
-    """Shapes of a ring without grips, the flat ring first."""
+    """Yield shapes of a ring without grips, the flat ring first."""
     wanted = math.ceil(abs(scene.ring.natural_ratio))
     most = min(max(_COVERED, wanted), scene.n_edges // _EDGES_A_COVER)
     for turns in range(1, most + 1):
@@ -53,14 +53,14 @@ def free_starts(scene: Scene, full: GrippedRing) -> Iterator[FreeRing]:
         if tilt is not None:
             yield covered(full, turns, tilt)
     yield eight(full, 0.5 * math.pi)
-    yield from twisted_rests(scene)[1]
+    yield from twisted_states(scene).free
 
 
 def gripped_starts(scene: Scene, full: GrippedRing, gamma: float) -> Iterator[FreeRing]:
-    """States on the path of twisting at a rotation of the grips, stable and unstable ones.
+    """Yield the states on the path of twisting at a rotation of the grips, stable or not.
 
-    And the mirror images of those at 2 pi - gamma: grips turned by -(2 pi - gamma) are where they
-    are when turned by gamma.
+    It also yields the mirror images of the states at 2 pi - gamma: grips turned by -(2 pi - gamma)
+    have the same position as grips turned by gamma.
     """
     ring = ring_of(scene)
     other = 2.0 * math.pi - gamma
@@ -74,7 +74,7 @@ def gripped_starts(scene: Scene, full: GrippedRing, gamma: float) -> Iterator[Fr
                     free = released(ring, full, state)
                     quat, stretch = free.state.quat * signs, free.state.stretch
                     yield balance(full.rod, quat, stretch, full.supports, gamma)
-    except ContinuationFailed:  # what was found on the way counts
+    except ContinuationFailed:  # the states found before are kept
         return
 
 
@@ -85,19 +85,9 @@ def covered(full: GrippedRing, turns: int, roll: float = 0.0) -> FreeRing:
 
 
 def eight(full: GrippedRing, roll: float = 0.0) -> FreeRing:
-    """The ring as a planar figure eight.
-
-    Notes
-    -----
-    The tangent's angle theta of an inflectional elastica is sin(theta/2) = k sn(u), one period of
-    4 K(k) to the ring's length; it closes where 2 E(k) = K(k) (Love 1927, 263).
-    """
-    from scipy.special import ellipe, ellipj, ellipk
-
-    m = find_root(lambda m: float(2.0 * ellipe(m) - ellipk(m)), 0.5, 0.95)
+    """The ring as a planar figure eight."""
     share = full.arc_length / full.rod.cell.sum()
-    theta = 2.0 * np.arcsin(math.sqrt(m) * ellipj(4.0 * ellipk(m) * share, m)[0])
-    return _bent(full, theta - 2.0 * math.pi * share, roll)
+    return _bent(full, eight_angles(share) - 2.0 * math.pi * share, roll)
 
 
 def _bent(full: GrippedRing, more: Array, roll: float) -> FreeRing:

@@ -1,10 +1,10 @@
-"""What other states are there? A search by deflation, pushes and soft modes.
+"""Search for all states of a ring by deflation, unstable modes and soft modes.
 
-From starts that are known to be states of some ring (`states_starts`) deflated Newton's method
-(`states_deflation`) goes to states not yet known. Each new state is pushed along its ways down
-(`states_basins`), which finds the minima, and is then itself a start: displaced along its softest
-modes, near and far, to either side. The search ends when enough states are known or all starts are
-used up. That there are no others is not proved, only looked for.
+From initial guesses (`initial_guesses`) deflated Newton's method (`deflation`) finds states not yet
+known. Each new state is followed down its unstable modes (`transitions`), which finds the minima.
+Then it is itself an initial guess: displaced along its softest modes, near and far, to both sides.
+The search ends when enough states are known or all guesses are used. It does not prove that there
+are no other states.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from der.utils.checks import checked_number, shown
 from der.utils.run import Run
 
 MOST = 200  # states that may be asked for
-WAYS = 8  # down, at most: states with more are counted and left out
+WAYS = 8  # largest index: states with more unstable modes are counted and left out
 _SOFTEST = 6  # modes of a state along which the search goes on
 _SIZES = (0.3, 0.9, 1.8)  # rad, root mean square: how far along them it starts
 _TRIES, _FEWEST_TRIES = 8, 64  # starts for each state asked for, and in all
@@ -51,14 +52,14 @@ def states(
     count: int = 12,
     progress: Callable[[int], object] | None = None,
 ) -> States:
-    """Equilibria of a ring, free in space or in its grips, and which of them falls to which.
+    """Return equilibria of a ring, free in space or in its grips, and their transitions.
 
     Parameters
     ----------
-    scene : ring, section, mesh and measure; how it is controlled does not matter.
+    scene : ring, section, mesh and measure; its control does not matter.
     gamma : rotation of each grip, rad, from 0 to 2 pi; None: the ring without grips.
-    count : states after which the search ends; minima that these fall to are added.
-    progress : called with the number of states after every start.
+    count : states after which the search ends; minima that these relax to are added.
+    progress : called with the number of states after every initial guess.
 
     Returns
     -------
@@ -90,7 +91,7 @@ def states(
 
 
 def check(scene: Scene, gamma: float | None, count: int) -> None:
-    """Raise ValueError, naming the argument, where `states` cannot do what is asked."""
+    """Raise ValueError, naming the argument, if `states` cannot do the search."""
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a der.Scene, got {shown(scene)}")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
@@ -103,50 +104,45 @@ def check(scene: Scene, gamma: float | None, count: int) -> None:
 
 
 def _flat(full: GrippedRing, tolerance: float) -> str:
-    """What the solver says of the flat ring, where that is not at rest."""
+    """Why the flat ring is no equilibrium; "" if it is one."""
     at = full.correct(full.start, tolerance=tolerance)
     return "" if at.converged else f"; the flat ring is no equilibrium: {at.advice}"
 
 
 @dataclass
 class Search:
-    """States found so far, and where to look next."""
+    """States found so far, and the initial guesses still to try."""
 
     images: Images
     count: int
     known: list[Known] = field(default_factory=list)
     indices: list[int | None] = field(default_factory=list)
-    peaks: list[Known] = field(default_factory=list)  # with too many ways down
-    pushes: list[tuple[int, Descent, tuple[int, ...]]] = field(default_factory=list)
+    peaks: list[Known] = field(default_factory=list)  # with too many unstable modes
+    followed: list[tuple[int, Descent, tuple[int, ...]]] = field(default_factory=list)
     tried: int = 0
     nowhere: int = 0
 
     def run(self, starts: Iterator[FreeRing]) -> Iterator[None]:
-        """Search from each start and from all that is found, handing over after every one."""
+        """Search from each initial guess and from each state found; yield after every step."""
         for start in starts:
             if len(self.known) >= self.count:
                 return
-            self._try(start)
-            yield
-            yield from self._push_new()
+            yield from self._try(start)
         begun: deque[Iterator[FreeRing]] = deque()
         opened = 0
         while len(self.known) < self.count and self.tried < max(_TRIES * self.count, _FEWEST_TRIES):
-            while opened < len(self.known):  # those just found take their turn, lowest first
-                begun.append(self._beside(opened))
-                opened += 1
+            begun.extend(self._beside(k) for k in range(opened, len(self.known)))  # new states
+            opened = len(self.known)
             if not begun:
                 return
             source = begun.popleft()
             beside = next(source, None)
-            if beside is None:
-                continue
-            begun.append(source)
-            self._try(beside)
-            yield
-            yield from self._push_new()
+            if beside is not None:
+                begun.append(source)
+                yield from self._try(beside)
 
-    def _try(self, start: FreeRing) -> None:
+    def _try(self, start: FreeRing) -> Iterator[None]:
+        """Search from one initial guess, and down from all states that are new."""
         self.tried += 1
         one = deflated(start, self.known + self.peaks, self.images)
         index = None if one is None else one.free.index()
@@ -156,9 +152,16 @@ class Search:
             self.peaks.append(one)
         else:
             self._add(one)
+        yield
+        k = max((start for start, _, _ in self.followed), default=-1) + 1
+        while k < len(self.known):
+            for down in descents(self.known[k], self.indices[k] or 0, self.images):
+                self.followed.append((k, down, tuple(self._add(rest) for rest in down.rests)))
+                yield
+            k += 1
 
     def _add(self, one: Known) -> int:
-        """Where a state stands in the list; it is added if it is new."""
+        """Return the position of a state in the list; it is added if it is new."""
         at = recognised(one, self.known, self.images)
         if at is not None:
             return at
@@ -166,50 +169,37 @@ class Search:
         self.indices.append(one.free.index())
         return len(self.known) - 1
 
-    def _push_new(self) -> Iterator[None]:
-        """Push all states that have not been pushed."""
-        done = {start for start, _, _ in self.pushes}
-        k = max(done, default=-1) + 1
-        while k < len(self.known):
-            for fall in descents(self.known[k], self.indices[k] or 0, self.images):
-                self.pushes.append((k, fall, tuple(self._add(rest) for rest in fall.rests)))
-                yield
-            k += 1
-
     def _beside(self, k: int) -> Iterator[FreeRing]:
-        """Starts beside a state, near ones first."""
+        """Initial guesses beside a state, near ones first."""
         free = self.known[k].free
         _, modes = free.system.softest_modes(free.state, _SOFTEST)
         length = math.sqrt(float(free.rod.length.sum()))
-        for size in _SIZES:
-            for mode in modes:
-                for sign in (1.0, -1.0):
-                    yield displaced(free, sign * size * length * mode)
+        for size, mode, sign in product(_SIZES, modes, (1.0, -1.0)):
+            yield displaced(free, sign * size * length * mode)
 
 
 def record(scene: Scene, full: GrippedRing, search: Search, gamma: float | None) -> States:
-    """The record of a search, lowest state first."""
+    """Return the record of a search, lowest state first."""
     order = sorted(range(len(search.known)), key=lambda k: search.known[k].energy)
     known = [search.known[k] for k in order]
     indices = [search.indices[k] for k in order]
     called = names(full, known, indices)
-    name = {k: called[i] for i, k in enumerate(order)}
+    name = dict(zip(order, called, strict=True))
     rows = zip(known, called, indices, strict=True)
     transitions = []
-    for start, fall, rests in search.pushes:
-        end = name[rests[-1]] if fall.ended else None
-        via = tuple(name[k] for k in (rests[:-1] if fall.ended else rests))
-        released = search.known[start].energy - fall.rests[-1].energy if fall.ended else None
-        way = Transition(name[start], end, fall.stiffness, fall.sign, via, released)
-        transitions.append((order.index(start), way))
-    about = {**mesh_numerics(scene, full), "count": search.count}
+    for start, down, rests in sorted(search.followed, key=lambda one: order.index(one[0])):
+        end = name[rests[-1]] if down.ended else None
+        via = tuple(name[k] for k in (rests[:-1] if down.ended else rests))
+        released = search.known[start].energy - down.rests[-1].energy if down.ended else None
+        mode = (down.stiffness, down.sign)
+        transitions.append(Transition(name[start], end, *mode, via, released))
     return States(
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
-        numerics=about,
+        numerics={**mesh_numerics(scene, full), "count": search.count},
         gamma=gamma,
         states=tuple(described(full, *row) for row in rows),
-        transitions=tuple(way for _, way in sorted(transitions, key=lambda one: one[0])),
+        transitions=tuple(transitions),
         tried=search.tried,
         nowhere=search.nowhere,
         peaks=len(search.peaks),

@@ -1,23 +1,23 @@
-"""How far two shapes of a ring are apart, whatever moves and mirrors it at no cost.
+"""Distance of two shapes of a ring, up to rigid motions and the symmetries of the problem.
 
-A shape is known by its curvatures k = (k1, k2, k3) about d1, d2, d3, here the rotation vectors from
-frame to frame over the length between them: rigid motions do not change them. Two shapes are one
-where something that maps the problem on itself maps one on the other:
+A shape is described by its curvatures k = (k1, k2, k3) about d1, d2, d3: the rotation vectors from
+frame to frame over the length between them. Rigid motions do not change them. Two shapes are the
+same state if a symmetry of the problem maps one onto the other:
 
     mirror      x -> -x1, d1 and the sense of rotation reversed:   k(s) -> (k1, -k2, -k3)(s)
     reversal    the curve run backwards, d1 and d3 reversed:       k(s) -> (k1, -k2,  k3)(-s)
     shift       of the material along the curve:                   k(s) -> k(s + c)
     roll        of the bar by half a turn about its tangent:       k(s) -> (-k1, -k2, k3)(s)
 
-All but the last leave k1 free, so that the natural curvature about d1 allows them where it is
-itself the same at s + c, or at -s + c: any c on a uniform ring, half the length on an ellipse. A
-bar that is naturally straight may be rolled, and where it is as stiff one way as the other, by any
-angle: such states are compared by k1^2 + k2^2, k1 k2' - k2 k1' and k3, which that leaves free.
-Grips have to be mapped on grips, and the mirror turns them the other way: it is no symmetry at a
-given rotation, but for multiples of pi. The distance is the least root mean square difference of k
-over all these, times the ring's mean radius. Over all shifts of a uniform ring it is least where
-the correlation of the two is largest: a trigonometric polynomial, whose peak is found by FFT and
-Newton's method, so that a shift need not be one of whole cells.
+All but the last keep k1. They are symmetries if the natural curvature about d1 has the same value
+at s + c, or at -s + c: any c on a uniform ring, half the length on an ellipse. A naturally straight
+bar may be rolled, and an isotropic one by any angle; such states are compared by k1^2 + k2^2,
+k1 k2' - k2 k1' and k3, which a roll does not change. With grips, a symmetry must map grips to
+grips. The mirror reverses their rotation: it is a symmetry only at multiples of pi. The distance is
+the least root mean square difference of k over all symmetries, times the ring's mean radius. Over
+all shifts of a uniform ring it is least where the correlation of the two shapes is largest. The
+correlation is a trigonometric polynomial; its peak is found by FFT and Newton's method, so a shift
+need not be a multiple of a cell.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ Signal = NDArray[np.complex128]
 
 SAME = 1e-3  # of the distance: below, two shapes are one
 _ALIKE = 1e-9  # of cells and natural strains
-_FINER = 4  # places between two vertices at which the correlation is looked at
-_HARMONICS = 24  # of a uniform ring's curvatures: what is finer than these tells no states apart
+_FINER = 4  # samples of the correlation between two vertices
+_HARMONICS = 24  # of a uniform ring's curvatures: finer ones do not distinguish states
 _UNMOVED = 1e-6  # of the largest Fourier coefficient: noise
 
 _MIRROR = np.array([1.0, -1.0, -1.0])
@@ -47,7 +47,7 @@ _REVERSAL = np.array([1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Move:
-    """One way to map a ring on itself: signs of k, reversal, then a shift by whole cells."""
+    """One symmetry of a ring: signs of k, reversal, then a shift by an integer number of cells."""
 
     sign: Array  # (3,)
     backwards: bool
@@ -61,10 +61,10 @@ class Move:
 
 @dataclass(frozen=True)
 class Images:
-    """All ways to map a ring in its supports on itself."""
+    """All symmetries of a ring in its supports."""
 
     moves: tuple[Move, ...]
-    slides: bool  # whether any shift maps the ring on itself: moves then have none of their own
+    slides: bool  # whether any shift is a symmetry: moves then have no shift
     spins: bool  # whether the bar may be rolled by any angle
     weight: Array  # (n,) of the vertices, in a mean square over the length
     radius: float  # mean radius L/(2 pi)
@@ -101,7 +101,7 @@ def curvatures(rod: Rod, state: State) -> Array:
 
 
 def images(rod: Rod, supports: Supports, load: float) -> Images:
-    """The ways to map a full ring on itself, in its grips turned to ``load`` if it has any."""
+    """Return the symmetries of a full ring, in its grips turned to ``load`` if it has any."""
     n = rod.n_edges
     gripped = bool(np.any(supports.turn))
     uniform = _equal(rod.cell, rod.cell[0]) and _equal(rod.rest, rod.rest[0])
@@ -129,7 +129,7 @@ def images(rod: Rod, supports: Supports, load: float) -> Images:
 
 
 def repeats(k: Array) -> int:
-    """How often a shape of a uniform ring repeats itself around it; 0: it is the same everywhere.
+    """Return how often a shape of a uniform ring repeats around it; 0: it is uniform.
 
     The greatest common divisor of the orders of all Fourier coefficients that are not noise.
     """
@@ -139,7 +139,7 @@ def repeats(k: Array) -> int:
 
 
 def _unrolled(k: Array) -> Array:
-    """What a roll of the bar by any angle does not change of curvatures (n, 3)."""
+    """Invariants (n, 3) of curvatures under a roll of the bar by any angle."""
     rate = 0.5 * (np.roll(k, -1, axis=0) - np.roll(k, 1, axis=0))
     turning = k[:, 0] * rate[:, 1] - k[:, 1] * rate[:, 0]
     return np.stack([k[:, 0] ** 2 + k[:, 1] ** 2, turning, k[:, 2]], axis=1)

@@ -1,9 +1,10 @@
-"""Where a state falls to when it is pushed along its ways down.
+"""Transitions: the states reached from an unstable state along its unstable modes.
 
-The ring flows down its energy (`gradient_flow`) from a nudge along each mode of negative stiffness,
-to either side, and Newton's method finishes. A nudge keeps the symmetry of its mode, and so does
-the flow, which then may come to rest on a saddle that is a minimum among symmetric shapes only; it
-is noted, and the ring nudged on along the steepest way down from there, until nothing leads down.
+The ring is displaced along each mode of negative stiffness, to both sides, and flows down its
+energy (`rod.dynamics.flow`); Newton's method finishes. The displacement and the flow keep the
+symmetry of the mode. So the flow may end on a saddle that is a minimum among symmetric shapes only.
+The saddle is recorded, and the ring is displaced from there along its most unstable mode, until a
+minimum is reached.
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ from der.rod.free_ring import FreeRing, balance
 
 _NUDGE = 0.03  # rad, root mean square
 _TOLERANCE = 1e-6  # GJ/a, of the flow; Newton's method goes on
-_MOST_MODES = 24  # looked at: nearest to zero come first, so steep ones ask for more
-_MOST_SADDLES = 6  # passed on one fall; each has fewer ways down than the one before
+_MOST_MODES = 24  # computed: those nearest to zero come first, and very unstable ones last
+_MOST_SADDLES = 6  # of one transition; each has fewer unstable modes than the one before
 _MOST_STEPS = 2000  # of a flow; most take below 200
 
 
 @dataclass(frozen=True)
 class Descent:
-    """One push and what it led to."""
+    """The transition along one mode."""
 
-    stiffness: float  # of the mode pushed along
+    stiffness: float  # of the mode
     sign: int
-    rests: tuple[Known, ...]  # states in which the ring came to rest, the last a minimum
-    ended: bool  # whether there is such a last one
+    rests: tuple[Known, ...]  # equilibria reached, the last a minimum
+    ended: bool  # whether a minimum is reached
 
 
 def unstable_modes(one: FreeRing, index: int) -> tuple[Array, Array]:
-    """Eigenvalues (m,) and modes (m, n, b) of negative stiffness, the steepest first."""
+    """Return eigenvalues (m,) and modes (m, n, b) of negative stiffness, the lowest first."""
     system = one.system
     negative = np.zeros(0, dtype=int)
     count = index + 2
@@ -51,14 +52,14 @@ def unstable_modes(one: FreeRing, index: int) -> tuple[Array, Array]:
 
 
 def descents(one: Known, index: int, images: Images) -> Iterator[Descent]:
-    """What pushes along all ways down lead to, to either side of each."""
+    """Yield the transitions along all unstable modes, to both sides of each."""
     values, modes = unstable_modes(one.free, index)
     for value, mode in zip(values, modes, strict=True):
         for sign in (1, -1):
-            yield _fall(one, float(value), sign, mode, images)
+            yield _descent(one, float(value), sign, mode, images)
 
 
-def _fall(one: Known, stiffness: float, sign: int, mode: Array, images: Images) -> Descent:
+def _descent(one: Known, stiffness: float, sign: int, mode: Array, images: Images) -> Descent:
     rests: list[Known] = []
     here = one
     push = sign * mode
@@ -77,7 +78,7 @@ def _fall(one: Known, stiffness: float, sign: int, mode: Array, images: Images) 
 
 
 def _landed(here: FreeRing, push: Array, images: Images) -> Known | None:
-    """The equilibrium in which the flow from a push ends; None where it does not."""
+    """The equilibrium in which the flow from a displacement ends; None: it does not end."""
     size = _NUDGE * math.sqrt(float(here.rod.length.sum()))
     system = here.unpinned
     kick = system.increment(size * push)

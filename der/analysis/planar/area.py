@@ -1,8 +1,8 @@
-"""How much room a planar shape takes: the area inside its outer boundary, holes filled.
+"""Area of a planar shape inside its outer boundary, holes filled.
 
-Between the frames of the mesh the curve is known well: its tangent's angle less the natural one is
-smooth, also where the natural curvature jumps, and a spline. A polygon of points along it, with
-one at every jump, loses area to chords as h^2, which two of them take out.
+Between the frames of the mesh the curve is interpolated: its tangent angle less the natural one is
+smooth, even where the natural curvature jumps, and is taken as a spline. A polygon of points along
+the curve, with one at every jump, has an error of area of order h^2, which extrapolation removes.
 """
 
 from __future__ import annotations
@@ -17,17 +17,15 @@ from der.kernels.planar import Array
 from der.rod.planar_ring import PlanarRing
 
 _POINTS = 1500  # of the finest polygon, at least
-_STRANDS = (
-    3  # its points are so many times those of the mesh: those of the folded circle share them
-)
-_GRID = 1e-11  # of the extent: coordinates are rounded to it, so that such strands are one
+_STRANDS = 3  # its points are a multiple of this for each cell: the folded circle's then coincide
+_GRID = 1e-11  # of the extent: coordinates are rounded to it, so that such strands coincide
 _NODE, _WEIGHT = np.polynomial.legendre.leggauss(4)
 
 
 def packing_ratio(mesh: PlanarRing, phi: Array, turning: int) -> tuple[float, float]:
     """Area inside the outer boundary of a shape over that of the flat ring, and its error.
 
-    The error is that of polygons for the curve; that of the mesh is not in it.
+    The error is that of the polygons, without that of the mesh.
     """
     flat, _ = _without_chords(enclosed_area, mesh.ring.position(_along(mesh)[1:])[:, 1:])
     area, error = _without_chords(envelope_area, curve(mesh, phi, turning))
@@ -48,11 +46,11 @@ def curve(mesh: PlanarRing, phi: Array, turning: int) -> Array:
     angle = natural + uniform * node + spline(node)
     tangents = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     points = np.cumsum(0.5 * step * (tangents @ _WEIGHT), axis=0)
-    return np.asarray(points - s[1:, None] / length * points[-1])  # what the mesh leaves open
+    return np.asarray(points - s[1:, None] / length * points[-1])  # closes the gap of the mesh
 
 
 def _along(mesh: PlanarRing) -> Array:
-    """Arc lengths (n + 1,) of points, in every cell equally many, equally far apart."""
+    """Arc lengths (n + 1,) of points, equally many and equally spaced in every cell."""
     times = _STRANDS * math.ceil(_POINTS / (_STRANDS * mesh.n_edges))
     places = np.arange(times * mesh.n_edges + 1) / times
     return np.interp(places, np.arange(mesh.n_edges + 1), mesh.places)

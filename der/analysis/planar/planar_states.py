@@ -1,24 +1,25 @@
 """The planar states of a ring: circles covered several times, figure eights, the folded shape.
 
-One unknown an edge, so that all of them take milliseconds. Sought are states symmetric about the
-twisting axis: the ring bent evenly, which solves rings of D2 symmetry at once and is where Newton
-starts with others, and what comes of circle and eight as the circle's natural curvature is changed
-into the ring's own. On that way rings with sharp corners have several branches; one that
-equilateral triangles share, and their neighbours do not, is entered from either side with an
-imperfection that ends with the way.
+There is one unknown for each edge, so a search takes milliseconds. It finds states symmetric about
+the twisting axis. One is the ring bent uniformly: for rings of D2 symmetry it is a solution, for
+others an initial guess. The others are reached from circle and figure eight when the natural
+curvature of the circle is changed step by step into the ring's own. On this path rings with sharp
+corners have several branches. One branch exists for equilateral triangles, but not for their
+neighbours; it is reached from both sides with an imperfection that vanishes at the end of the path.
 
-How stable a state is counts in its plane only; `states` knows of space.
+The index is that in the plane; for modes in space see `multistability.states`.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from der.analysis.path_record import run_entries
+from der.analysis.state_names import numbered, planar_name
 from der.continuation.arclength import follow
 from der.continuation.events import Events
 from der.continuation.richardson import limit
@@ -26,14 +27,8 @@ from der.errors import ContinuationFailed, Reason
 from der.kernels.planar import Array
 from der.problem import Options
 from der.records.planar import FOLDED, PlanarState, PlanarStates
-from der.records.record import SolveTime
 from der.rod.planar_ring import PlanarRing, covered, eight, planar_ring, shapes, shifted
-from der.rod.planar_system import (
-    PlanarConfiguration,
-    PlanarEquilibrium,
-    PlanarRodSystem,
-    solved,
-)
+from der.rod.planar_system import PlanarConfiguration, PlanarEquilibrium, PlanarRodSystem, solved
 from der.scene import Scene, meshes, sector_name
 from der.utils.checks import shown
 from der.utils.run import Run
@@ -41,11 +36,11 @@ from der.utils.run import Run
 MOST = 12  # turns
 _TURNS = 3
 _EDGES_A_TURN = 8  # at least
-_IMPERFECTION = 1.0  # rad, of one wave on the ring, on the way to it
-# other branches may lie close by: steps no longer than these
-_OPTIONS = Options(first_step=0.02, largest_step=0.12, sharpest_turn=0.45)
+_IMPERFECTION = 1.0  # rad, of one wave on the ring, at the start of the path
+# steps are short, because other branches may be close
+OPTIONS = Options(first_step=0.02, largest_step=0.12, sharpest_turn=0.45)
 _ALIKE = 1e-7  # of the energies of two states that are one
-_COSTLESS = 1e-6  # of EI1 (2 pi/L)^2: stiffness of a motion that costs nothing
+_COSTLESS = 1e-6  # of EI1 (2 pi/L)^2: stiffness of a motion without energy
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +49,18 @@ class Found:
 
     turning: int
     at: PlanarEquilibrium
-    pin: Array | None  # the shift of the material, where it costs nothing
+    pin: Array | None  # the shift of the material, if it needs no energy
 
 
 def planar(scene: Scene, *, turns: int | None = None) -> PlanarStates:
-    """The planar states of a ring left alone, symmetric about its twisting axis.
+    """Return the planar states of a free ring that are symmetric about its twisting axis.
 
     Parameters
     ----------
-    scene : ring, section and mesh, and whether error bars are wanted; how it is controlled does not
-        matter. Only alpha of the section enters, as a factor of energies and forces.
-    turns : covered circles are sought up to so many turns, either way round; None: 3, or as many as
-        the bar would like to.
+    scene : ring, section and mesh, and whether error bars are wanted; its control does not matter.
+        Only alpha of the section enters, as a factor of energies and forces.
+    turns : largest number of turns of covered circles, in both senses; None: 3, or as many as the
+        natural curvature has.
 
     Returns
     -------
@@ -80,9 +75,9 @@ def planar(scene: Scene, *, turns: int | None = None) -> PlanarStates:
     """
     most = check_planar(scene, turns)
     mesh = planar_ring(scene)
-    both_ways = [k for t in range(most + 1) for k in dict.fromkeys((t, -t))]
-    # of a naturally straight ring those that turn the other way are mirror images
-    turnings = [k for k in both_ways if k >= 0 or scene.ring.natural_ratio != 0.0]
+    both_senses = [k for t in range(most + 1) for k in dict.fromkeys((t, -t))]
+    # of a naturally straight ring those of negative turning number are mirror images
+    turnings = [k for k in both_senses if k >= 0 or scene.ring.natural_ratio != 0.0]
     with Run() as run:
         each = run.collect(states_of_turning(mesh, k, scene.tolerance) for k in turnings)
         found = sorted((one for several in each for one in several), key=lambda one: one.at.energy)
@@ -90,19 +85,15 @@ def planar(scene: Scene, *, turns: int | None = None) -> PlanarStates:
         if not found and run.done:
             run.stop(Reason.NO_START, "no state was found from any start; use more edges")
     return PlanarStates(
-        status=run.status,
-        message=run.message,
-        ring=scene.ring.to_json(),
-        section=asdict(scene.section),
+        **run_entries(scene, run),
         numerics=planar_numerics(scene),
         states=named(rows),
-        timing=SolveTime(run.seconds),
         shapes=shapes(mesh, [found[k].at.phi for k in kept]) if found else None,
     )
 
 
 def check_planar(scene: Scene, turns: int | None = None) -> int:
-    """The turns to go to; ValueError, naming the argument, where a scene is not one in a plane."""
+    """Return the largest number of turns; ValueError, naming the argument, for a wrong scene."""
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a der.Scene, got {shown(scene)}")
     if scene.stretch != "inextensible":
@@ -121,7 +112,7 @@ def check_planar(scene: Scene, turns: int | None = None) -> int:
 
 
 def planar_numerics(scene: Scene) -> dict[str, object]:
-    """The numerical choices behind an answer, as they are written."""
+    """Return the numerical choices behind an answer, as they are recorded."""
     return {
         "n_edges": scene.n_edges,
         "unknowns_per_edge": 1,
@@ -142,7 +133,7 @@ def coarser(scene: Scene) -> list[PlanarRing]:
 
 
 def states_of_turning(mesh: PlanarRing, turning: int, tolerance: float) -> list[Found]:
-    """States that turn so many times, each once, lowest first."""
+    """States of one turning number, each once, lowest first."""
     found: list[Found] = []
     for one in _eights(mesh, tolerance) if turning == 0 else _covered(mesh, turning, tolerance):
         alike = _ALIKE * max(abs(one.at.energy), 1.0)
@@ -152,12 +143,12 @@ def states_of_turning(mesh: PlanarRing, turning: int, tolerance: float) -> list[
 
 
 def _covered(mesh: PlanarRing, turning: int, tolerance: float) -> Iterator[Found]:
-    """What is found from circles."""
+    """States found from circles."""
     at = solved(mesh.rod(turning), covered(mesh, turning), np.zeros(2), tolerance=tolerance)
     if at.converged:
         yield Found(turning, at, None)
         if np.hypot(*at.force) <= _COSTLESS:
-            return  # bent evenly: no shape of this turning has less energy
+            return  # bent uniformly: no shape of this turning number has less energy
     turn = 2.0 * math.pi * mesh.share
     bumps = [np.sin(turn)]  # symmetric about the twisting axis, and about the other one
     if mesh.ring.symmetry == "D2":
@@ -171,7 +162,7 @@ def _covered(mesh: PlanarRing, turning: int, tolerance: float) -> Iterator[Found
 
 
 def _eights(mesh: PlanarRing, tolerance: float) -> Iterator[Found]:
-    """What is found from the two symmetric figure eights."""
+    """States found from the two symmetric figure eights."""
     for shift in (0.0, 0.25):
         phi = eight(mesh, shift)
         pin = shifted(mesh, phi)
@@ -188,7 +179,7 @@ def _eights(mesh: PlanarRing, tolerance: float) -> Iterator[Found]:
 def _led(
     mesh: PlanarRing, turning: int, natural: Array, phi: Array, pin: Array | None, tolerance: float
 ) -> PlanarEquilibrium | None:
-    """The state that one of a ring of these natural angles becomes in this ring; None: none."""
+    """The state of this ring reached from one of a ring of these natural angles; None: none."""
     turn = float(mesh.rest.sum())
     begin = np.diff(np.append(natural, natural[0] + turn))
     rod = mesh.rod(turning, begin, mesh.rest - begin)
@@ -199,7 +190,7 @@ def _led(
     events: Events[PlanarConfiguration] = Events(
         targets=(1.0,), stop=lambda at: at.parameter == 1.0
     )
-    options = replace(_OPTIONS, tolerance=tolerance)
+    options = replace(OPTIONS, tolerance=tolerance)
     try:
         *_, last = follow(system, start.state, events, options=options)
     except ContinuationFailed:
@@ -209,7 +200,7 @@ def _led(
     return end if end.converged else None
 
 
-# --- What is said about a state --------------------------------------------------------------
+# --- The record of a state -------------------------------------------------------------------
 
 
 def _described(scene: Scene, mesh: PlanarRing, one: Found) -> PlanarState:
@@ -219,43 +210,26 @@ def _described(scene: Scene, mesh: PlanarRing, one: Found) -> PlanarState:
         at = _on_coarser(coarse, one, mesh, scene.tolerance)
         if at is not None:
             levels.append((coarse, at))
-    packings: list[float] = []
-    polygons = 0.0
-    if one.turning == FOLDED:
-        for level, at in levels:
-            value, error = packing_ratio_of(level, at.phi, one.turning)
-            packings.append(value)
-            polygons = max(polygons, error)
     alpha = scene.section.alpha
-    energy, energy_error = _sure([alpha * at.energy for _, at in levels])
-    force, _ = _sure([alpha * float(np.hypot(*at.force)) for _, at in levels])
-    packing, packing_error = _sure(packings) if packings else (None, None)
-    index, costless = _index(mesh, one)
-    return PlanarState(
-        "",
-        one.turning,
-        energy,
-        energy_error,
-        index,
-        costless,
-        max(force, 0.0),
-        packing,
-        None if packing_error is None else packing_error + polygons,
-        alpha * one.at.residual,
-    )
+    energy, energy_error = _extrapolated([alpha * at.energy for _, at in levels])
+    force, _ = _extrapolated([alpha * float(np.hypot(*at.force)) for _, at in levels])
+    packing, packing_error = None, None
+    if one.turning == FOLDED:
+        from der.analysis.planar.area import packing_ratio  # which takes long to load
 
-
-def packing_ratio_of(mesh: PlanarRing, phi: Array, turning: int) -> tuple[float, float]:
-    """`planar_area.packing_ratio`, imported where it is asked for."""
-    from der.analysis.planar.area import packing_ratio
-
-    return packing_ratio(mesh, phi, turning)
+        ratios = [packing_ratio(level, at.phi, one.turning) for level, at in levels]
+        packing, packing_error = _extrapolated([value for value, _ in ratios])
+        if packing_error is not None:
+            packing_error += max(error for _, error in ratios)
+    energies, packings = (energy, energy_error), (packing, packing_error)
+    index, force, residual = _index(mesh, one), max(force, 0.0), alpha * one.at.residual
+    return PlanarState("", one.turning, *energies, *index, force, *packings, residual)
 
 
 def _on_coarser(
     coarse: PlanarRing, one: Found, fine: PlanarRing, tolerance: float
 ) -> PlanarEquilibrium | None:
-    """The same state on a mesh of every second edge, or fourth; None: there is none."""
+    """The same state on a mesh with half or a quarter of the edges; None: there is none."""
     every = fine.n_edges // coarse.n_edges
     pin = None if one.pin is None else one.pin[::every]
     at = solved(
@@ -264,15 +238,15 @@ def _on_coarser(
     return at if at.converged else None
 
 
-def _sure(levels: list[float]) -> tuple[float, float | None]:
-    """Extrapolated value and error, where all three meshes have one."""
+def _extrapolated(levels: list[float]) -> tuple[float, float | None]:
+    """Extrapolated value and error, if all three meshes have a value."""
     if len(levels) < 3:
         return levels[0], None
     return limit(*levels)
 
 
 def _index(mesh: PlanarRing, one: Found) -> tuple[int | None, int]:
-    """Ways down in the plane, and motions that cost nothing."""
+    """Index in the plane, and number of motions without energy."""
     system, at = PlanarRodSystem(mesh.rod(one.turning)), one.at
     small = _COSTLESS * (2.0 * math.pi / mesh.ring.length) ** 2
     up, down = (system.negative(at.state, shift) for shift in (small, -small))
@@ -282,9 +256,9 @@ def _index(mesh: PlanarRing, one: Found) -> tuple[int | None, int]:
 
 
 def _distinct(rows: list[PlanarState]) -> tuple[list[PlanarState], list[int]]:
-    """States that are not, within their errors, images of one before, and where they stand.
+    """States that are not images of earlier ones, within their errors, and their positions.
 
-    A square ring's own symmetry maps states on others, but not the mesh.
+    The symmetry of a square ring maps states onto others, but does not map the mesh onto itself.
     """
     kept: list[int] = []
     for k, row in enumerate(rows):
@@ -300,23 +274,7 @@ def _same(a: PlanarState, b: PlanarState) -> bool:
 
 
 def named(rows: list[PlanarState]) -> tuple[PlanarState, ...]:
-    """The states, lowest first, with names: numbered where several turn alike."""
+    """Return the states, lowest first, with names: numbered if several have one turning number."""
     rows = sorted(rows, key=lambda one: one.energy)
-    total, seen = Counter(row.turning for row in rows), Counter[int]()
-    found = []
-    for row in rows:
-        seen[row.turning] += 1
-        number = f" {seen[row.turning]}" if total[row.turning] > 1 else ""
-        found.append(replace(row, name=f"{_word(row.turning)}{number}"))
-    return tuple(found)
-
-
-def _word(turning: int) -> str:
-    """What a state of so many turns is called."""
-    number = {2: "two", 3: "three", 4: "four", 5: "five"}.get(abs(turning), str(abs(turning)))
-    word = "flat" if abs(turning) == 1 else f"{number}-covered"
-    if turning == 0:
-        return "figure eight"
-    if turning < 0:
-        return "flipped" if turning == -1 else f"{word}, flipped"
-    return word
+    names = numbered([planar_name(row.turning) for row in rows])
+    return tuple(replace(row, name=name) for row, name in zip(rows, names, strict=True))

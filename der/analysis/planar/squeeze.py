@@ -1,23 +1,24 @@
-"""A ring between two opposite points of its plane, brought together or drawn apart: the elastica.
+"""A planar ring whose two points on the twisting axis are moved together or apart: the elastica.
 
-The points are those of the twisting axis, and the strut between them turns as it likes: it is one
-more edge, which nothing bends, and its length is the load. What draws the points apart is its
-conjugate, dU/d distance. Strands pass through each other.
+The strut between the points is one more edge without bending stiffness, free to turn. Its length is
+the load, and the force that parts the points is its conjugate, dU/d distance. Strands may pass
+through each other.
 
-Error bars are those of an equal share of the flat ring's distance, which has an error of its own on
-a mesh: from states on N/2 and N/4 edges that start at every second and fourth edge of the fine
-one's. Special points are found on each mesh and matched in their order.
+Error bars compare states at the same ratio of the distance to that of the flat ring, which has an
+error of its own on a mesh. States on N/2 and N/4 edges start from every second and fourth edge of
+the fine mesh. Special points are found on each mesh and matched in their order.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from der.analysis.planar.planar_states import check_planar, coarser, planar_numerics
+from der.analysis.path_record import run_entries
+from der.analysis.planar.planar_states import OPTIONS, check_planar, coarser, planar_numerics
 from der.continuation.arclength import follow
 from der.continuation.events import Events
 from der.continuation.richardson import limit
@@ -25,39 +26,31 @@ from der.errors import ContinuationFailed, Reason
 from der.kernels.planar import Array
 from der.problem import Options, Point
 from der.records.planar import Squeeze, SqueezePoint
-from der.records.record import SolveTime
 from der.rod.planar_ring import PlanarRing, covered, planar_ring, shapes
-from der.rod.planar_system import (
-    PlanarConfiguration,
-    PlanarEquilibrium,
-    PlanarRodSystem,
-    solved,
-)
+from der.rod.planar_system import PlanarConfiguration, PlanarEquilibrium, PlanarRodSystem, solved
 from der.scene import Scene
 from der.utils.checks import checked_number
 from der.utils.run import Run
 
-_THERE = 1e-9  # of the distance: the flat ring is where it should go
-# the shape may have other branches close by: steps no longer than these
-_OPTIONS = Options(first_step=0.02, largest_step=0.12, sharpest_turn=0.45)
+_THERE = 1e-9  # of the distance: the flat ring is at its goal
 _SAME = 0.3  # rad: a state on another mesh that is further away is another state
 
 
 def squeeze(scene: Scene, distance: float = 0.0) -> Squeeze:
-    """The path of a flat ring whose points on the twisting axis are moved, in its plane.
+    """Return the path of a planar ring whose points on the twisting axis are moved.
 
     Parameters
     ----------
-    scene : ring, section and mesh, and whether error bars are wanted; how it is controlled does not
-        matter. Points on the ring's other axis are those of the ring with that twisting axis.
-    distance : between the points at the end, a: 0 where they touch, below half the ring's length,
-        where it would be drawn straight.
+    scene : ring, section and mesh, and whether error bars are wanted; its control does not matter.
+        Points on the ring's other axis are those of the ring with that twisting axis.
+    distance : between the points at the end, a: from 0, where they touch, to less than half the
+        ring's length, where the ring would be straight.
 
     Returns
     -------
     Squeeze
-        States, special points and shapes. A path that cannot be followed to its end says so in
-        ``status`` and ``message``; Ctrl-C keeps what was found.
+        States, special points and shapes. If the path cannot be followed to its end, ``status``
+        and ``message`` say why. Ctrl-C keeps the states found so far.
 
     Raises
     ------
@@ -71,22 +64,18 @@ def squeeze(scene: Scene, distance: float = 0.0) -> Squeeze:
     track = _Track.of(planar_ring(scene), scene)
     with Run() as run:
         points = run.collect(track.path(goal))
-        found = _extrapolated(track, points, goal, scene)
+        values, errors = _extrapolated(track, points, goal, scene)
     special = [k for k, one in enumerate(points) if one.kind]
-    column = dict(zip(("distance", "force", "energy"), found.values.T, strict=True))
+    column = dict(zip(("distance", "force", "energy"), values.T, strict=True))
     return Squeeze(
-        status=run.status,
-        message=run.message,
-        ring=scene.ring.to_json(),
-        section=asdict(scene.section),
+        **run_entries(scene, run),
         numerics=planar_numerics(scene),
         goal=goal,
         **column,
         index=tuple(one.solution.index for one in points),
-        force_error=found.errors[:, 1],
-        energy_error=found.errors[:, 2],
-        points=tuple(_point(points[k], found.values[k], found.errors[k]) for k in special),
-        timing=SolveTime(run.seconds),
+        force_error=errors[:, 1],
+        energy_error=errors[:, 2],
+        points=tuple(_point(points[k], values[k], errors[k]) for k in special),
         shapes=shapes(track.mesh, [one.solution.phi[:-1] for one in points]) if points else None,
     )
 
@@ -99,7 +88,7 @@ class _Track:
     system: PlanarRodSystem
     flat: PlanarEquilibrium
     first: float  # distance between the points of the flat ring on this mesh
-    scale: float  # that over the distance of the ring itself; 1 without error bars
+    scale: float  # that over the distance of the exact ring; 1 without error bars
     alpha: float
     options: Options
 
@@ -107,15 +96,15 @@ class _Track:
     def of(cls, mesh: PlanarRing, scene: Scene) -> _Track:
         """The flat ring at rest."""
         flat = solved(mesh.rod(1), covered(mesh, 1), np.zeros(2), tolerance=scene.tolerance)
-        first = float(mesh.way() @ (mesh.length * np.sin(flat.phi)))
+        first = float(mesh.chord() @ (mesh.length * np.sin(flat.phi)))
         ends = scene.ring.position([0.0, 0.5 * scene.ring.length])
         scale = first / float(ends[1, 2] - ends[0, 2]) if scene.error_bars else 1.0
         system = PlanarRodSystem(mesh.strutted(), parameter_name="distance")
-        options = replace(_OPTIONS, tolerance=scene.tolerance)
+        options = replace(OPTIONS, tolerance=scene.tolerance)
         return cls(mesh, system, flat, first, scale, scene.section.alpha, options)
 
     def path(self, goal: float) -> Iterator[Point[PlanarEquilibrium]]:
-        """Points from the flat ring on to a distance, special ones in their places."""
+        """Points from the flat ring to a distance, special points included."""
         forces = np.append(self.flat.force, [0, 0])
         start = self.at(self.first, self.flat.phi, 0.5 * math.pi, forces)
         if not start.converged:
@@ -137,29 +126,21 @@ class _Track:
         yield from follow(self.system, start.state, events, along=along, options=self.options)
 
     def at(self, length: float, phi: Array, turn: float, force: Array) -> PlanarEquilibrium:
-        """The state with a strut of a length, near a configuration."""
+        """The state with a strut of given length, near a configuration."""
         start = PlanarConfiguration(np.append(phi, turn), force, length)
         return self.system.correct(start, tolerance=self.options.tolerance)
 
     def values(self, one: PlanarEquilibrium) -> Array:
-        """Distance, force and energy (3,), the distance as a share of the ring's own."""
+        """Distance, force and energy (3,), the distance without the error of the flat ring."""
         return np.array(
             [one.parameter / self.scale, self.alpha * one.moment, self.alpha * one.energy]
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """What is known about the states of a path."""
-
-    values: Array  # (n, 3) distance, force, energy
-    errors: Array  # (n, 3) NaN: not known
-
-
 def _extrapolated(
     track: _Track, points: list[Point[PlanarEquilibrium]], goal: float, scene: Scene
-) -> _Columns:
-    """Values of the states, with errors where there are coarser meshes."""
+) -> tuple[Array, Array]:
+    """Distance, force and energy (n, 3) of the states, and errors (n, 3); NaN: not known."""
     values = np.array([track.values(one.solution) for one in points]).reshape(-1, 3)
     errors = np.full_like(values, np.nan)
     levels = [_Track.of(mesh, scene) for mesh in coarser(scene)]
@@ -174,11 +155,11 @@ def _extrapolated(
             continue
         for c in range(3):
             values[k, c], errors[k, c] = limit(values[k, c], same[0][c], same[1][c])
-    return _Columns(values, errors)
+    return values, errors
 
 
 def _again(level: _Track, fine: _Track, one: PlanarEquilibrium) -> list[Array]:
-    """Values of the same state on a coarser mesh; none where there is none."""
+    """Values of the same state on a coarser mesh; empty: there is none."""
     every = fine.mesh.n_edges // level.mesh.n_edges
     length = one.parameter * level.scale / fine.scale
     at = level.at(length, one.phi[:-1:every], float(one.phi[-1]), one.force)
@@ -187,7 +168,7 @@ def _again(level: _Track, fine: _Track, one: PlanarEquilibrium) -> list[Array]:
 
 
 def _special(level: _Track, points: list[Point[PlanarEquilibrium]], goal: float) -> list[Array]:
-    """Values of the special points of a coarser mesh; none where they are others."""
+    """Values of the special points of a coarser mesh; empty: they are of other kinds."""
     try:
         found = list(level.path(goal))
     except ContinuationFailed:
@@ -197,17 +178,7 @@ def _special(level: _Track, points: list[Point[PlanarEquilibrium]], goal: float)
 
 
 def _point(one: Point[PlanarEquilibrium], values: Array, errors: Array) -> SqueezePoint:
-    distance, force, energy = map(float, values)
     (before,), (after,) = one.sides or (one.index or (None,), one.index or (None,))
+    distance, force, energy = map(float, values)
     known = [None if np.isnan(error) else float(error) for error in errors]
-    return SqueezePoint(
-        one.kind,
-        distance,
-        force,
-        energy,
-        before,
-        after,
-        distance_error=known[0],
-        force_error=known[1],
-        energy_error=known[2],
-    )
+    return SqueezePoint(one.kind, distance, force, energy, before, after, *known)
