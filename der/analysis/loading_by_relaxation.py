@@ -52,20 +52,20 @@ def follow_relaxed(
     ContinuationFailed
         If the ring does not come to rest.
     """
-    walk = _Walk(ring, request, statistics, rise, tolerance, every)
+    loading = _Relaxation(ring, request, statistics, rise, tolerance, every)
     last = start
-    for one in _with_limits(walk, _relaxed_states(walk, start)):
+    for one in _with_limits(loading, _relaxed_states(loading, start)):
         last = one.solution
         yield one
     if unload:
-        back = replace(walk, request=replace(request, gamma_max=0.0))
+        back = replace(loading, request=replace(request, gamma_max=0.0))
         states = _with_limits(back, _relaxed_states(back, last))
         next(states)  # the state at which loading has ended
         yield from states
 
 
 @dataclass(frozen=True)
-class _Walk:
+class _Relaxation:
     """The settings of one loading by relaxation."""
 
     ring: GrippedRing
@@ -111,40 +111,42 @@ class _Walk:
         return sorted({*grid, *asked} - {first}, reverse=last < first)
 
 
-def _relaxed_states(walk: _Walk, start: Equilibrium | None) -> Iterator[Point[Equilibrium]]:
+def _relaxed_states(
+    loading: _Relaxation, start: Equilibrium | None
+) -> Iterator[Point[Equilibrium]]:
     """Relaxed states at the loads, and landings after snaps."""
-    ring = walk.ring
-    first = walk.relaxed(ring.start if start is None else start.state)
-    trail = [rested(ring, [], first)]
-    yield Point(trail[-1])
+    ring = loading.ring
+    first = loading.relaxed(ring.start if start is None else start.state)
+    recent = [rested(ring, [], first)]
+    yield Point(recent[-1])
     largest = 0.0  # moment so far
-    loads = walk.loads(first.state.load)[::-1]
+    loads = loading.loads(first.state.load)[::-1]
     while loads:
-        here = trail[-1].parameter
-        if len(trail) > 1:
-            longest = _LONGER * (here - trail[-2].parameter)
+        here = recent[-1].parameter
+        if len(recent) > 1:
+            longest = _LONGER * (here - recent[-2].parameter)
             if abs(loads[-1] - here) > abs(longest):
                 loads.append(here + 0.5 * longest)
-        found = walk.relaxed(ahead(ring, trail, loads[-1]))
-        walk.statistics.steps += 1
+        found = loading.relaxed(ahead(ring, recent, loads[-1]))
+        loading.statistics.steps += 1
         largest = max(largest, abs(found.moment))
-        if went_on(ring, trail, found) and is_work(trail, found, largest):
+        if went_on(ring, recent, found) and is_work(recent, found, largest):
             loads.pop()
-            at = rested(ring, trail, found)
-            trail = longer(ring, trail, found)
+            at = rested(ring, recent, found)
+            recent = longer(ring, recent, found)
             yield Point(at)
         elif abs(loads[-1] - here) > RESOLUTION:
             loads.append(0.5 * (here + loads[-1]))
         else:
-            landing = _landed(walk, trail, loads.pop())
-            trail = [landing.solution]
+            landing = _landed(loading, recent, loads.pop())
+            recent = [landing.solution]
             yield landing
 
 
-def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
-    """The end state of a snap between the last state of a trail and ``load``."""
-    ring, before = walk.ring, trail[-1]
-    found = walk.relaxed(ahead(ring, trail, load), walk.every)
+def _landed(loading: _Relaxation, recent: list[Equilibrium], load: float) -> Landing:
+    """The end state of a snap between the last state of some and ``load``."""
+    ring, before = loading.ring, recent[-1]
+    found = loading.relaxed(ahead(ring, recent, load), loading.every)
     rise = load - before.parameter
     states = (before.energy + before.moment * rise, before.moment), (found.energy, found.moment)
     details = snap_details(ring, load, *states, found.evaluations)
@@ -154,7 +156,9 @@ def _landed(walk: _Walk, trail: list[Equilibrium], load: float) -> Landing:
     return Landing(at, "snap", details=details, history=found.history, energies=energies)
 
 
-def _with_limits(walk: _Walk, states: Iterator[Point[Equilibrium]]) -> Iterator[Point[Equilibrium]]:
+def _with_limits(
+    loading: _Relaxation, states: Iterator[Point[Equilibrium]]
+) -> Iterator[Point[Equilibrium]]:
     """The points together with the limits of the moment, each state one step later."""
     window: list[list[Point[Equilibrium]]] = []  # three places, each with its equal states
     for one in states:
@@ -173,7 +177,7 @@ def _with_limits(walk: _Walk, states: Iterator[Point[Equilibrium]]) -> Iterator[
         a, b, c = (same[0].solution for same in window)
         turn = list(window[1])
         if (b.moment - a.moment) * (c.moment - b.moment) < 0.0:
-            turn.append(_turning(walk, a, b, c))
+            turn.append(_turning(loading, a, b, c))
         yield from sorted(
             turn, key=lambda v: v.solution.parameter, reverse=c.parameter < b.parameter
         )
@@ -182,7 +186,9 @@ def _with_limits(walk: _Walk, states: Iterator[Point[Equilibrium]]) -> Iterator[
         yield from same
 
 
-def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Point[Equilibrium]:
+def _turning(
+    loading: _Relaxation, a: Equilibrium, b: Equilibrium, c: Equilibrium
+) -> Point[Equilibrium]:
     """The limit of the moment among three relaxed states, by Brent's method and then a parabola.
 
     All states computed lie between the three: just beyond there may be a snap. Near a fold the
@@ -195,27 +201,27 @@ def _turning(walk: _Walk, a: Equilibrium, b: Equilibrium, c: Equilibrium) -> Poi
     sign = 1.0 if b.moment < a.moment else -1.0
 
     def moment(load: float) -> float:
-        return sign * _between(walk, a, c, load).moment
+        return sign * _between(loading, a, c, load).moment
 
     found = minimize_scalar(moment, bounds=(low, high), method="bounded", options={"xatol": h})
     load = min(max(float(found.x), low + h), high - h)
-    load = _vertex([_between(walk, a, c, x) for x in (load - h, load, load + h)])
-    return Point(_between(walk, a, c, min(max(load, low), high)), "limit")
+    load = _vertex([_between(loading, a, c, x) for x in (load - h, load, load + h)])
+    return Point(_between(loading, a, c, min(max(load, low), high)), "limit")
 
 
-def _vertex(trail: list[Equilibrium]) -> float:
+def _vertex(recent: list[Equilibrium]) -> float:
     """Load at which a parabola through three moments is stationary."""
-    x, y, z = (at.parameter for at in trail)
-    p, q, r = (at.moment for at in trail)
+    x, y, z = (at.parameter for at in recent)
+    p, q, r = (at.moment for at in recent)
     first, second = (q - p) / (y - x), (r - q) / (z - y)
     return y if first == second else 0.5 * (x + y) - 0.5 * first * (z - x) / (second - first)
 
 
-def _between(walk: _Walk, a: Equilibrium, c: Equilibrium, load: float) -> Equilibrium:
+def _between(loading: _Relaxation, a: Equilibrium, c: Equilibrium, load: float) -> Equilibrium:
     """The relaxed state at a load between those of two others."""
     part = (load - a.parameter) / (c.parameter - a.parameter)
-    step = walk.ring.difference(a.state, c.state)
-    guess = walk.ring.displacement(step, part)
+    step = loading.ring.difference(a.state, c.state)
+    guess = loading.ring.displacement(step, part)
     guess[-1] = load - a.parameter
-    found = walk.relaxed(walk.ring.retract(a.state, guess).but(load=load))
-    return rested(walk.ring, [a], found)
+    found = loading.relaxed(loading.ring.retract(a.state, guess).but(load=load))
+    return rested(loading.ring, [a], found)

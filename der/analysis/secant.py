@@ -24,18 +24,18 @@ _SHORTER = 0.1  # of the last step: a state so close to the last one replaces it
 _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 
 
-def ahead(ring: GrippedRing, trail: list[Equilibrium], load: float) -> State:
+def ahead(ring: GrippedRing, recent: list[Equilibrium], load: float) -> State:
     """Return the state at ``load`` extrapolated from the last three, or fewer."""
-    here = trail[-1]
+    here = recent[-1]
     rise = load - here.parameter
     rate = ring.increment(load=1.0)
-    if len(trail) > 1:
+    if len(recent) > 1:
         rate = _per_load(ring, here)
-    if len(trail) > 2:
-        older = _per_load(ring, trail[-2])
+    if len(recent) > 2:
+        older = _per_load(ring, recent[-2])
         # rates are means over their steps: from the middle of the last two to that of the next
-        span = 0.5 * (here.parameter - trail[-3].parameter)
-        lead = 0.5 * (load - trail[-2].parameter) / span
+        span = 0.5 * (here.parameter - recent[-3].parameter)
+        lead = 0.5 * (load - recent[-2].parameter) / span
         rate = rate + lead * (rate - older)
     return ring.retract(here.state, rise * rate).but(load=load)
 
@@ -45,23 +45,23 @@ def _per_load(ring: GrippedRing, at: Equilibrium) -> Increment:
     return ring.displacement(at.tangent, 1.0 / at.parameter_rate)
 
 
-def went_on(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> bool:
+def went_on(ring: GrippedRing, recent: list[Equilibrium], found: Relaxed) -> bool:
     """Whether a state is close to the extrapolation of the last ones: the ring has not snapped."""
-    miss = ring.difference(ahead(ring, trail, found.state.load), found.state)
+    miss = ring.difference(ahead(ring, recent, found.state.load), found.state)
     return math.sqrt(ring.inner(miss, miss)) < _MISS
 
 
-def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
+def is_work(recent: list[Equilibrium], found: Relaxed, largest: float) -> bool:
     """Whether a state's energy is that of the last one plus the work of the grips between them.
 
-    The moment is that of the polynomial through the states of the trail and this one; ``largest``
+    The moment is that of the polynomial through the last states and this one; ``largest``
     is the greatest so far.
     """
-    before = trail[-1]
+    before = recent[-1]
     rise = found.state.load - before.parameter
     if rise == 0.0:
         return True
-    known = [(at.parameter, at.moment) for at in trail]
+    known = [(at.parameter, at.moment) for at in recent]
     known.append((found.state.load, found.moment))
     mean = 0.0  # of a cubic, by Gauss's rule with two points
     for place in _GAUSS:
@@ -72,11 +72,11 @@ def is_work(trail: list[Equilibrium], found: Relaxed, largest: float) -> bool:
     return lost <= max(_LOST * largest * abs(rise), _FAINT * max(abs(found.energy), 1.0))
 
 
-def rested(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> Equilibrium:
-    """Return a relaxed state as an equilibrium: its rates are differences along the trail."""
+def rested(ring: GrippedRing, recent: list[Equilibrium], found: Relaxed) -> Equilibrium:
+    """Return a relaxed state as an equilibrium: its rates are differences of successive states."""
     tangent, slope = ring.increment(load=1.0), 0.0
-    if trail:
-        last = trail[-1]
+    if recent:
+        last = recent[-1]
         step = ring.difference(last.state, found.state)
         rise = float(step[-1])
         tangent, slope = last.tangent, last.slope  # where the two are one state
@@ -84,8 +84,8 @@ def rested(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> Equil
         if apart:
             tangent = step / math.sqrt(ring.inner(step, step))
             slope = (found.moment - last.moment) / rise
-        if apart and len(trail) > 1:
-            before = trail[-2]
+        if apart and len(recent) > 1:
+            before = recent[-2]
             older = (last.moment - before.moment) / (last.parameter - before.parameter)
             slope += rise * (slope - older) / (found.state.load - before.parameter)
     rate = float(tangent[-1])
@@ -105,14 +105,14 @@ def rested(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> Equil
     )
 
 
-def longer(ring: GrippedRing, trail: list[Equilibrium], found: Relaxed) -> list[Equilibrium]:
-    """Return the last states of a trail with a new one, which replaces one very close to it.
+def longer(ring: GrippedRing, recent: list[Equilibrium], found: Relaxed) -> list[Equilibrium]:
+    """Return the last states with a new one, which replaces one very close to it.
 
     Otherwise the next step would be extrapolated from differences of almost equal states.
     """
-    step = abs(found.state.load - trail[-1].parameter)
+    step = abs(found.state.load - recent[-1].parameter)
     if step <= CLOSE:
-        return trail
-    if len(trail) > 1 and step < _SHORTER * abs(trail[-1].parameter - trail[-2].parameter):
-        trail = trail[:-1]
-    return [*trail[-2:], rested(ring, trail, found)]
+        return recent
+    if len(recent) > 1 and step < _SHORTER * abs(recent[-1].parameter - recent[-2].parameter):
+        recent = recent[:-1]
+    return [*recent[-2:], rested(ring, recent, found)]

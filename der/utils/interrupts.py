@@ -53,7 +53,7 @@ def _callers(frame: FrameType | None) -> Iterator[str]:
 @contextmanager
 def interrupts_heard() -> Iterator[None]:
     """Let Ctrl-C raise KeyboardInterrupt while kernels run, for a program that then ends."""
-    with _answered_by(interrupt):
+    with _handled_by(interrupt, allowed=_replaceable()):
         yield
 
 
@@ -73,35 +73,33 @@ def interrupts_between_states() -> Iterator[list[int]]:
         else:
             pressed.append(number)
 
-    with _answered_by(take_down):
+    with _handled_by(take_down, allowed=_replaceable()):
         yield pressed
 
 
 @contextmanager
-def _answered_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Let a function handle Ctrl-C, unless another handler is installed."""
-    usual = signal.getsignal(signal.SIGINT)
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or usual not in (signal.default_int_handler, interrupt):
+def interrupts_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C while workers are closed: a second one would leave semaphores behind."""
+    # None: a handler that Python cannot set again
+    with _handled_by(signal.SIG_IGN, allowed=signal.getsignal(signal.SIGINT) is not None):
+        yield
+
+
+@contextmanager
+def _handled_by(
+    handler: Callable[[int, FrameType | None], None] | signal.Handlers, *, allowed: bool
+) -> Iterator[None]:
+    """Set the handler of Ctrl-C, if that is allowed and in the main thread."""
+    if not allowed or threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGINT, handler)
+    usual = signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, usual)
 
 
-@contextmanager
-def interrupts_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C while workers are closed: a second one would leave semaphores behind."""
-    usual = threading.current_thread() is threading.main_thread()
-    before = signal.getsignal(signal.SIGINT)
-    if not usual or before is None:  # None: a handler that Python cannot set again
-        yield
-        return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+def _replaceable() -> bool:
+    """Whether Python or `interrupt` handles Ctrl-C, and no handler of another program."""
+    return signal.getsignal(signal.SIGINT) in (signal.default_int_handler, interrupt)

@@ -11,7 +11,7 @@ from rods import solved
 
 import der
 from der.analysis.loading import follow_angle, follow_moment
-from der.analysis.loading_by_relaxation import RESOLUTION, RISE, _Walk, follow_relaxed
+from der.analysis.loading_by_relaxation import RESOLUTION, RISE, _Relaxation, follow_relaxed
 from der.analysis.request import Request
 from der.analysis.secant import ahead, is_work, longer, rested, went_on
 from der.analysis.snap import Landing
@@ -395,10 +395,10 @@ def test_relaxation_on_few_edges_finds_what_newton_does(shape, n_edges, h_over_t
 def test_a_jump_shorter_than_what_is_noticed_shows_in_its_energy():
     """A state that is near enough, whose energy is not that of the last and the work in between."""
     ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32)
-    walk = _Walk(ring, Request(stability=False), Statistics(), RISE, 1e-9, 0)
-    trail = [rested(ring, [], walk.relaxed(ring.start))]
+    loading = _Relaxation(ring, Request(stability=False), Statistics(), RISE, 1e-9, 0)
+    trail = [rested(ring, [], loading.relaxed(ring.start))]
     for load in (0.02, 0.04, 0.06):
-        found = walk.relaxed(ahead(ring, trail, load))
+        found = loading.relaxed(ahead(ring, trail, load))
         assert went_on(ring, trail, found)
         assert is_work(trail, found, abs(found.moment))
         trail = longer(ring, trail, found)
@@ -410,13 +410,13 @@ def test_a_jump_shorter_than_what_is_noticed_shows_in_its_energy():
 def test_a_state_all_but_beside_the_last_one_does_not_lead_the_way():
     """Differences over 1e-7 rad would magnify the residual to what a step of 0.05 turns."""
     ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32)
-    walk = _Walk(ring, Request(stability=False), Statistics(), RISE, 1e-9, 0)
-    trail = [rested(ring, [], walk.relaxed(ring.start))]
+    loading = _Relaxation(ring, Request(stability=False), Statistics(), RISE, 1e-9, 0)
+    trail = [rested(ring, [], loading.relaxed(ring.start))]
     for load in (0.05, 0.1, 0.1 + 1e-7):
-        trail = longer(ring, trail, walk.relaxed(ahead(ring, trail, load)))
+        trail = longer(ring, trail, loading.relaxed(ahead(ring, trail, load)))
     assert [at.state.load for at in trail] == [0.0, 0.05, 0.1 + 1e-7]
-    assert abs(walk.relaxed(ahead(ring, trail, 0.15)).state.load - 0.15) < 1e-15
-    assert went_on(ring, trail, walk.relaxed(ahead(ring, trail, 0.15)))
+    assert abs(loading.relaxed(ahead(ring, trail, 0.15)).state.load - 0.15) < 1e-15
+    assert went_on(ring, trail, loading.relaxed(ahead(ring, trail, 0.15)))
 
 
 def test_slope_without_a_hessian_is_of_second_order():

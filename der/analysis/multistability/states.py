@@ -38,7 +38,7 @@ from der.utils.checks import checked_number, shown
 from der.utils.run import Run
 
 MOST = 200  # states that may be asked for
-WAYS = 8  # largest index: states with more unstable modes are counted and left out
+LARGEST_INDEX = 8  # largest index: states with more unstable modes are counted and left out
 _SOFTEST = 6  # modes of a state along which the search goes on
 _SIZES = (0.3, 0.9, 1.8)  # rad, root mean square: how far along them it starts
 _TRIES, _FEWEST_TRIES = 8, 64  # starts for each state asked for, and in all
@@ -148,7 +148,7 @@ class Search:
         index = None if one is None else one.free.index()
         if one is None:
             self.nowhere += 1
-        elif index is not None and index > WAYS:
+        elif index is not None and index > LARGEST_INDEX:
             self.peaks.append(one)
         else:
             self._add(one)
