@@ -14,7 +14,6 @@ from der.problem import Point, Statistics, total_index
 from der.records.configurations import Shapes
 from der.records.path import AtPi, Path, Timing, counts
 from der.records.path import Point as RecordedPoint
-from der.records.record import SolveTime
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.scene import Scene
@@ -111,12 +110,6 @@ def state_at_pi(ring: GrippedRing, one: Point[Equilibrium], index_free: int | No
     index = total_index(ring, one.index)
     slope = ring.arm_moment(one.solution.slope)
     return AtPi(moment, slope, energy, index, moment_index(one, index), index_free)
-
-
-def run_entries(scene: Scene, run: Run) -> dict[str, Any]:
-    """Return the entries of a record that tell of the ring and of the run."""
-    ring = {"ring": scene.ring.to_json(), "section": asdict(scene.section)}
-    return {"status": run.status, "message": run.message, "timing": SolveTime(run.seconds), **ring}
 
 
 def mesh_numerics(scene: Scene, ring: GrippedRing) -> dict[str, object]:

@@ -24,8 +24,9 @@ from der.analysis.landscape.flood import Cell, Flood, shaken, spread
 from der.analysis.landscape.landscape import bare_request, distance
 from der.analysis.landscape.rest_states import with_rests
 from der.analysis.loading import follow_angle
-from der.analysis.path_record import mesh_numerics, run_entries
+from der.analysis.path_record import mesh_numerics
 from der.analysis.request import Request, ring_of
+from der.analysis.run_record import run_entries
 from der.analysis.snap import Landing
 from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array

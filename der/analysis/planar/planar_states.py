@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from der.analysis.path_record import run_entries
+from der.analysis.run_record import run_entries
 from der.analysis.state_names import numbered, planar_name
 from der.continuation.arclength import follow
 from der.continuation.events import Events

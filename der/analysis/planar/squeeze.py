@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from der.analysis.path_record import run_entries
 from der.analysis.planar.planar_states import OPTIONS, check_planar, coarser, planar_numerics
+from der.analysis.run_record import run_entries
 from der.continuation.arclength import follow
 from der.continuation.events import Events
 from der.continuation.richardson import limit
