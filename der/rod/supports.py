@@ -70,17 +70,15 @@ def supported(
         raise ValueError(f"pull must have the shape (3,) or ({n}, 3), got {np.shape(pull)}")
     free = np.ones((n, rod.block), dtype=bool)
     free[list(clamped)] = False
-    rates = np.zeros(n)
+    rates, longer, force = np.zeros(n), np.zeros(n), np.zeros((n, 3))
     for j, rate in (turn or {}).items():
         if free[j].any():
             raise ValueError(f"edge {j} turns with the load but is not clamped")
         rates[j] = rate
-    longer = np.zeros(n)
     for j, rate in (reach or {}).items():
         if rates[j] != 0.0:
             raise ValueError(f"edge {j} turns with the load and cannot lengthen with it, too")
         longer[j] = rate
-    force = np.zeros((n, 3))
     if pull is not None:
         force[:] = pull
     return Supports(
