@@ -86,8 +86,9 @@ class _Relaxation:
         found = relax(self.ring, start, tolerance=self.tolerance, every=every)
         self.statistics.force_evaluations += found.evaluations
         if not found.rests:
-            place = f"at gamma = {start.load:.8f} the ring"
-            raise ContinuationFailed(f"{place} {found.advice}", Reason.NOT_AT_REST)
+            subject = "" if found.where >= 0 else "the ring "
+            place = f"at gamma = {start.load:.8f} {subject}{found.advice}"
+            raise ContinuationFailed(place, Reason.NOT_AT_REST)
         return found
 
     def loads(self, first: float) -> list[float]:
