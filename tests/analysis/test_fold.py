@@ -538,7 +538,7 @@ def test_a_path_that_never_arrives_is_unfoldable_and_says_so():
 
 @pytest.mark.parametrize("stretch", ["inextensible", "finite"])
 def test_free_index_of_a_triangle(stretch):
-    """One way down with the grips removed, though stable in them: 120 degrees, r/a = 1/15, h/t = 4.
+    """Index 1 with the grips removed, though stable in them: 120 degrees, r/a = 1/15, h/t = 4.
 
     With finite stretch the ring settles a little when the grip lets its edge go.
     """

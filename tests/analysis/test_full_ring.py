@@ -139,7 +139,7 @@ def test_relaxation_alone_keeps_its_snap_too():
 
 
 def test_eigenvalues_have_the_signs_of_the_index():
-    """On the unstable branch the softest mode is in phase, and a way down; none elsewhere."""
+    """On the unstable branch the softest mode is in phase and unstable; none elsewhere."""
     path = folded(control="arclength", modes=True)
     softest = path.shapes.softest
     assert softest.classes == ("in phase", "out of phase", "odd")

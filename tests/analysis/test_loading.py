@@ -146,7 +146,7 @@ def test_the_full_ring_falls_off_a_branch_point(stability):
 def test_the_full_ring_leaves_a_branch_point_along_its_mode_of_negative_stiffness():
     """An ellipse, b/a = 0.54 about x, h/t = 1.33: an odd mode turns soft at gamma = 3.005.
 
-    Past it a mode of small positive stiffness is nearer to zero than the one that is a way down.
+    Past it a mode of small positive stiffness is nearer to zero than the unstable one.
     """
     shape, section = der.ellipse(0.5425345743524903), der.rectangular_section(1.3259928102023317)
     ring = gripped_ring(shape, section, 128, name="full")
@@ -175,7 +175,7 @@ def test_a_branch_that_returns_to_its_symmetric_path_is_followed_back():
 
 
 def test_a_march_does_not_start_from_a_saddle():
-    """A state with a way down is refused, with a sentence."""
+    """An unstable state is refused, with a sentence."""
     between = next(point for point in path(1.6) if point.index == (1, 0, 0))
     ring = gripped_ring(der.circle(), der.rectangular_section(1.6), 64)
     with pytest.raises(ContinuationFailed, match="no minimum"):
@@ -317,7 +317,7 @@ def test_a_stop_at_zero_that_is_only_overrun_does_not_hold_the_ring():
 
 
 def test_a_ring_that_comes_to_rest_at_its_stop_is_on_it():
-    """A triangle that is let go at M = 0 rests at gamma = 0 to rounding: it ends there exactly."""
+    """A triangle released at M = 0 rests at gamma = 0 to rounding: it ends there exactly."""
     shape = der.triangle(math.radians(75.459472779033), 0.18701066520775167)
     ring = gripped_ring(shape, der.rectangular_section(3.6130411355236483), 128)
     request = Request(self_crossings=False, stability=False)
