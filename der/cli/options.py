@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from der.cli.output import say
 from der.cli.parsing import argument, numbers, option
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ SHAPES = {  # and the options that go with each
     "triangle": ("vertex_angle", "r_over_a"),
     "profile": (),
 }
+UNSURE = 0.02  # relative; of a profile's curvature, which is then warned of
 NU = 0.3  # Poisson's ratio where none is given
 
 
@@ -31,13 +33,13 @@ class RingOptions:
 
     shape: str = argument("The ring: " + ", ".join(SHAPES) + ".", "SHAPE")
     file: str | None = argument(
-        "Of a profile: CSV of arc_length, curvature or x, y.", "[FILE]", None
+        "Of a profile: a table of x, y (points) or arc_length, curvature; or JSON.", "[FILE]", None
     )
     b_over_a: float | None = option("Short semi-axis over the long one, ellipse and rectangle.")
     r_over_a: float | None = option("Radius of the fillets, rectangle and triangle.")
     vertex_angle: float | None = option("Angle at the apex of a triangle, degrees.")
     natural_curvature: float | None = option("Natural curvature of a circle, in units of 1/a.")
-    axis: str = option("Twisting axis: x (grips at the short semi-axis) or y.", "x")
+    axis: str | None = option("Twisting axis: x (grips at the short semi-axis), the default, or y.")
     h_over_t: float | None = option("Height over thickness of the section.")
     alpha: float | None = option("EI1/GJ, with --beta.")
     beta: float | None = option("EI2/GJ, with --alpha.")
@@ -62,21 +64,23 @@ class RingOptions:
             raise typer.TyperException(
                 f"FILE must be given with SHAPE profile, and with it only, got {self.file!r}"
             )
-        if self.axis not in ("x", "y"):
+        if self.axis not in (None, "x", "y"):
             raise ValueError(f"axis must be x or y, got {self.axis!r}")
-        if self.shape in ("triangle", "profile") and self.axis == "y":
-            raise ValueError(f"axis must be x for a {self.shape}, its axis of symmetry, got 'y'")
+        if self.shape == "triangle" and self.axis == "y":
+            raise ValueError("axis must be x for a triangle, its axis of symmetry, got 'y'")
         if self.shape == "circle":  # both axes are alike
             return rings.circle(1.0 if self.natural_curvature is None else self.natural_curvature)
         if self.shape == "profile":
             from der.geometry.profile_csv import read_profile
 
-            return read_profile(str(self.file))
+            ring = read_profile(str(self.file), self.axis)
+            _warn_if_unsure(ring)
+            return ring
         values = {name: getattr(self, name) for name in own}
         if self.shape == "triangle":
             return rings.triangle_in_degrees(**values)
         make: Any = {"ellipse": rings.ellipse, "rectangle": rings.rectangle}[self.shape]
-        return make(**values, twist_axis=self.axis)
+        return make(**values, twist_axis=self.axis or "x")
 
     def section(self) -> Section:
         """The section that the command line describes."""
@@ -103,6 +107,17 @@ class RingOptions:
         if beta is None:
             raise ValueError(f"beta must be given together with --alpha {alpha}, got none")
         return section(alpha, beta)
+
+
+def _warn_if_unsure(ring: Ring) -> None:
+    """Say so where the data of a profile do not tell its curvature well."""
+    error, grid = ring.parameters["curvature_error"], ring.parameters.get("resolution")
+    if error > UNSURE:
+        rounded = f", rounded to {grid:.3g}" if grid else ""
+        say(
+            f"der: warning: profile: natural curvature known to +-{100 * error:.2g} % from these "
+            f"data{rounded}; error bars do not include that"
+        )
 
 
 @dataclass(frozen=True)

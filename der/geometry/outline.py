@@ -19,6 +19,7 @@ Piece: TypeAlias = tuple[float, float]  # length, curvature
 
 ROUNDING = 1e-14  # lengths below this are none: the straights left by the largest fillet, say
 LARGEST_TURN = 4 * np.pi  # of one piece: beyond, the Gauss sums lose digits
+LITTLE_TURN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,18 +98,19 @@ class PiecewiseLinear:
 def _chord(u: Array, angle: Array, curvature: Array, slope: Array) -> ComplexArray:
     """Return the integral of exp(i Theta) over [0, u], Theta = angle + curvature u + slope u^2/2.
 
-    24 Gauss points are exact to rounding up to LARGEST_TURN, and for a fillet with many to spare.
+    24 Gauss points are exact to rounding up to LARGEST_TURN, and five up to LITTLE_TURN.
     """
-    node, weight = _gauss()
+    turn = np.abs(u) * (np.abs(curvature) + np.abs(slope * u) / 2)
+    node, weight = _gauss(24 if np.max(turn, initial=0.0) > LITTLE_TURN else 5)
     v = np.multiply.outer(u, (1 + node) / 2)
     turned = v * (curvature[..., None] + slope[..., None] * v / 2)
     return u / 2 * np.exp(1j * angle) * (np.exp(1j * turned) @ weight)
 
 
 @cache
-def _gauss() -> tuple[Array, Array]:
-    """The 24 Gauss points in [-1, 1] and their weights, which take longer to find than to use."""
-    node, weight = np.polynomial.legendre.leggauss(24)
+def _gauss(n: int) -> tuple[Array, Array]:
+    """The Gauss points in [-1, 1] and their weights, which take longer to find than to use."""
+    node, weight = np.polynomial.legendre.leggauss(n)
     return node, weight
 
 

@@ -1,44 +1,90 @@
-"""Rings of the user's own shape from files: CSV with one line of names, or JSON."""
+"""Rings of the user's own shape from files: tables of two or three columns, or JSON."""
 
 from __future__ import annotations
 
-import csv
 import json
+from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from der.geometry.ring import Ring
 from der.geometry.shapes import profile
+from der.geometry.table import read_table
+from der.utils.checks import shown
 
-COLUMNS = {
-    ("arc_length", "curvature"): "knots of the natural curvature",
-    ("x", "y"): "points of the curve",
-}
+if TYPE_CHECKING:
+    from der.geometry.ring import Ring
+    from der.geometry.table import Table
+
+ARC_LENGTH = ("arc_length", "arclength", "arc", "s")
+CURVATURE = ("curvature", "kappa", "k", "k1u")
+PLACES = (
+    ("x", "y", "z"),
+    ("r1", "r2", "r3"),
+    ("x1", "x2", "x3"),
+    ("x", "y"),
+    ("r2", "r3"),
+    ("r1", "r2"),
+    ("x1", "x2"),
+    ("x", "z"),
+    ("y", "z"),
+)  # names of the coordinates of points
+LARGEST = 2**28  # bytes: seven million points
 
 
-def read_profile(file: str) -> Ring:
-    """The ring of a file.
+def read_profile(file: str, twist_axis: str | None = None) -> Ring:
+    """Return the ring of a file, in units of half its larger extent.
 
     Parameters
     ----------
-    file : a CSV file whose first line names its two columns, arc_length,curvature or x,y; or JSON,
-        an object with "arc_length" and "curvature", or with "points", a list of pairs. Lines of a
-        CSV file that start with # are not read. What they mean, `shapes.profile` says.
+    file : str
+        A table: columns separated by commas, semicolons, tabs or spaces; decimal points, or decimal
+        commas where columns are separated otherwise. Lines that are empty or start with # are not
+        read. Names of columns, with or without units, stand in a line before the numbers: x, y or
+        x, y, z for points of the curve, arc_length, curvature for its natural curvature. Numbers
+        without names are points. Or JSON: an object with "points", a list of pairs, or with
+        "arc_length" and "curvature".
+    twist_axis : str, optional
+        Of several mirror axes "x", the shortest, or "y", the longest: see `shapes.profile`.
 
     Raises
     ------
     ValueError
         Where the file cannot be read, is of another form, or not a ring; named by ``file``.
     """
+    path, first = Path(file), ""
     try:
-        text = Path(file).read_text(encoding="utf-8")
-        entries = _of_json(text) if Path(file).suffix == ".json" else _of_csv(text)
-        return profile(**entries)  # type: ignore[arg-type]
+        if path.stat().st_size > LARGEST:
+            raise ValueError(f"must have at most {LARGEST} bytes, got {path.stat().st_size}")
+        content = path.read_bytes()
     except OSError as wrong:
         raise ValueError(f"file must be readable, got {file!r}: {wrong.strerror}") from None
-    except UnicodeDecodeError:
-        raise ValueError(f"file must be a text file, got {file!r}") from None
-    except (ValueError, TypeError, csv.Error) as wrong:
+    except ValueError as wrong:
         raise ValueError(f"file {file!r}: {wrong}") from None
+    text = _decoded(content)
+    if text is None:
+        raise ValueError(f"file must be a text file, got {file!r}")
+    try:
+        if path.suffix == ".json":
+            return profile(**_of_json(text), twist_axis=twist_axis, resized=True)  # type: ignore[arg-type]
+        table = read_table(text)
+        first = f" (numbers from line {table.line} on)"
+        return profile(**_columns(table), twist_axis=twist_axis, resized=True)  # type: ignore[arg-type]
+    except (ValueError, TypeError, RecursionError) as wrong:
+        if str(wrong).startswith("axis"):
+            raise
+        raise ValueError(f"file {file!r}{first}: {wrong}") from None
+
+
+def _decoded(content: bytes) -> str | None:
+    """Return the text of a file, None where it is none."""
+    encodings = ["utf-16"] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else ["utf-8-sig", "cp1252"]
+    for encoding in encodings:
+        try:
+            text = content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        return None if "\0" in text else text
+    return None
 
 
 def _of_json(text: str) -> dict[str, object]:
@@ -51,19 +97,25 @@ def _of_json(text: str) -> dict[str, object]:
     return entries
 
 
-def _of_csv(text: str) -> dict[str, object]:
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    names, *rows = [[entry.strip() for entry in row] for row in csv.reader(lines)] or [[]]
-    if tuple(names) not in COLUMNS:
-        allowed = " or ".join(",".join(columns) for columns in COLUMNS)
-        raise ValueError(f"its first line must be {allowed}, got {','.join(names)!r}")
-    values: list[list[float]] = []
-    for number, row in enumerate(rows, start=1):
-        try:
-            first, second = (float(entry) for entry in row)
-        except ValueError:
-            raise ValueError(f"row {number} must be two numbers, got {','.join(row)!r}") from None
-        values.append([first, second])
-    if names[0] == "x":
-        return {"points": values}
-    return {"arc_length": [s for s, _ in values], "curvature": [k for _, k in values]}
+def _columns(table: Table) -> dict[str, object]:
+    """Return the arguments of `profile` that the columns are, by their names."""
+    place = {word: i for i, words in reversed(list(enumerate(table.names))) for word in words}
+    for arc_length, curvature in product(ARC_LENGTH, CURVATURE):
+        if arc_length in place and curvature in place:
+            columns = table.values[:, [place[arc_length], place[curvature]]].T
+            return {"arc_length": columns[0], "curvature": columns[1]}
+    for known in PLACES:
+        if all(word in place for word in known):
+            return {"points": table.values[:, [place[word] for word in known]]}
+    if table.names and not table.is_comment:
+        raise ValueError(
+            f"its columns must be named x,y (or x,y,z) for points, or arc_length,curvature, "
+            f"got {shown(table.header)}"
+        )
+    if table.values.shape[1] not in (2, 3):
+        raise ValueError(
+            f"must have two or three columns, or a line that names them, got "
+            f"{table.values.shape[1]} in line {table.line}; numbers with decimal commas must be "
+            "separated by semicolons, tabs or spaces"
+        )
+    return {"points": table.values}

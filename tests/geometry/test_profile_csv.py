@@ -42,10 +42,14 @@ def test_curvature_of_a_circle_is_the_circle(tmp_path, name):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.csv", "x,y\n1,2\n1,two\n", "row 2 must be two numbers, got '1,two'"),
-        ("a.csv", "x,y\n1,2,3\n", "row 1 must be two numbers"),
-        ("a.csv", "1,2\n3,4\n", "first line must be arc_length,curvature or x,y, got '1,2'"),
-        ("a.csv", "", "first line must be"),
+        ("a.csv", "x,y\n1,2\n1,two\n", "line 3 must be 2 finite numbers as line 2 is, got '1,two'"),
+        ("a.csv", "x,y\n\n1,2\n#\n3,\n", "line 5 must be 2 finite numbers as line 3 is, got '3,'"),
+        ("a.csv", "1 2\n3 nan\n", "line 2 must be 2 finite numbers"),
+        ("a.csv", "x,y\n1,2,3\n", "line 1 must name the 3 columns below it, got 'x,y'"),
+        ("a.csv", "theta,r\n1,2\n", "columns must be named x,y .*, got 'theta,r'"),
+        ("a.csv", "0,5,1,5\n", "decimal commas must be separated by semicolons"),
+        ("a.csv", "1,2\n3,4\n", r"\(numbers from line 1 on\): points must be at least 8, .* got 2"),
+        ("a.csv", "", "must have lines of numbers, such as 1.5,2.5, got none"),
         ("a.csv", "x,y\n0,0\n1,1\n", "points"),
         ("a.json", "{", "a.json"),
         ("a.json", "[1, 2]", "must be an object with arc_length and curvature, or with points"),

@@ -492,8 +492,13 @@ def test_bad_input_is_named(make, message):
         ({"arc_length": [0, 10], "curvature": [5, -5]}, "got 50 rad after arc length 0"),
         ({"arc_length": [0, 1], "curvature": [1, 1], "points": egg(9)}, "points must be given w"),
         ({"points": egg(6)}, "points must be at least 8, each unlike its neighbour, got 6"),
-        ({"points": np.zeros((9, 2))}, "points must be at least 8"),
-        ({"points": np.zeros((9, 3))}, r"points must have shape \(n, 2\), got \(9, 3\)"),
+        ({"points": np.zeros((9, 2))}, "points must have an extent .*, got 0"),
+        ({"points": np.zeros((9, 4))}, r"shape \(n, 2\) or \(n, 3\), got \(9, 4\)"),
+        ({"points": 1e200 * egg(80)}, "points must have an extent from 1e-100 to 1e100"),
+        ({"points": egg(80)[np.argsort(egg(80)[:, 0])]}, "once round a closed ring, in order"),
+        ({"points": egg(80), "twist_axis": "z"}, "twist_axis must be 'x' or 'y', got 'z'"),
+        ({"points": egg(80), "twist_axis": "y"}, "axis must be x for a profile with one axis"),
+        ({"arc_length": [0, 7e6], "curvature": [0, 0]}, "must be in units of a and end between"),
     ],
 )
 def test_bad_profile_is_named(arguments, message):
@@ -502,18 +507,32 @@ def test_bad_profile_is_named(arguments, message):
         profile(**arguments)
 
 
-def test_lopsided_arrays_are_refused():
-    """An ellipse that starts off its axes closes, but has no mirror image about the grip."""
+def test_the_axis_is_found():
+    """An ellipse that starts off its axes: the ring begins at the nearer end of one of them."""
     exact = ellipse(0.6)
     s = around(exact, 4001)
-    with pytest.raises(ValueError, match="mirror symmetric about the twisting axis to 1e-09 rad"):
-        profile(s, exact.curvature(s + 0.3))
+    points = exact.position(s[:-1])[:, 1:]
+    for ring in (
+        profile(s, exact.curvature(s + 0.3)),
+        profile(points=np.roll(points, 700, axis=0)),
+    ):
+        assert ring.symmetry == "D2"
+        assert_allclose(ring.angle(around(ring)), exact.angle(around(exact)), atol=1e-5)
 
 
-def test_lopsided_points_are_refused():
-    """The same for points."""
-    with pytest.raises(ValueError, match="points must be mirror symmetric"):
-        profile(points=np.roll(egg(80), 7, axis=0))
+def test_what_has_no_axis_is_refused():
+    """With its distance from the mirror image: of waves in 2 t and 3 t without a common axis.
+
+    About the second axis, one of those of the larger wave, the smaller wave and its image differ by
+    4 cos(0.8) cos(3 t) of a radius of 100. The best axis, in mean squares, is turned a little.
+    """
+    t = 2 * np.pi * np.arange(400) / 400
+    r = 100 + 10 * np.cos(2 * t) + 2 * np.cos(3 * t + 0.8)
+    points = np.column_stack([r * np.cos(t), r * np.sin(t)])
+    with pytest.raises(ValueError, match=r"points must be mirror symmetric .* distance of") as no:
+        profile(points=points)
+    told = float(str(no.value).split("a distance of ")[1].split()[0])
+    assert 0.7 < told / (4 * math.cos(0.8)) < 1.3
 
 
 @pytest.mark.parametrize(
