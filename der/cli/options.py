@@ -113,10 +113,10 @@ def _warn_if_unsure(ring: Ring) -> None:
     """Say so where the data of a profile do not tell its curvature well."""
     error, grid = ring.parameters["curvature_error"], ring.parameters.get("resolution")
     if error > UNSURE:
-        rounded = f", rounded to {grid:.3g}" if grid else ""
+        data = f"points known to +-{grid / 2:.2g}" if grid else "these data"
         say(
-            f"der: warning: profile: natural curvature known to +-{100 * error:.2g} % from these "
-            f"data{rounded}; error bars do not include that"
+            f"der: warning: profile: natural curvature known to +-{100 * error:.2g} % from "
+            f"{data}; error bars do not include that"
         )
 
 

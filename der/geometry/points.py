@@ -20,6 +20,10 @@ Rate: TypeAlias = Callable[[Array, int], ComplexArray]  # derivative of an order
 FEWEST = 8  # points
 MOST = 4096  # points that are joined, and pieces of curvature: more than any mesh needs
 INTEGER = 1e-4  # how near to integers coordinates on a grid are, in its steps
+ENOUGH = 64  # points, for noise to be told from a lack of points
+STEADY = 0.6  # of the error at half the distance: the errors of noise hardly fall
+LEAST = 1e-9  # of the extent: noise that is rounding of the computer
+NORMAL = 0.6745  # the median size of normal errors, in standard deviations
 COARSE = 4  # grid steps: points nearer to each other are replaced by their mean
 SAMPLED = 10_000  # coordinates among which a grid is sought
 PLANAR = 1e-3  # of the extent
@@ -73,12 +77,36 @@ def _grid(values: Array) -> float:
     gaps = gaps[gaps > 1e-9 * largest]
     if len(gaps) < FEWEST:
         return 0.0
-    decade = np.floor(np.log10(largest))
+    decade = np.floor(np.log10(offset[-1] - offset[0]))
     for unit in [*(10.0 ** (decade - np.arange(9))).tolist(), float(gaps.min())]:
         steps = np.round(offset / unit)
         if np.max(np.abs(offset / unit - steps)) < INTEGER:
             return unit * float(np.gcd.reduce(steps.astype(np.int64)))
     return 0.0
+
+
+def unsteadiness(z: ComplexArray) -> float:
+    """Return the step of the grid whose rounding is as large as the noise in points; 0 if none.
+
+    Splines through every other point tell those between them. Their errors fall at least as the
+    square of the distance if the curve is smooth, and do not if the points are noise: then their
+    variance is 1.7 times that of a point, weights of a cubic spline halfway between its knots.
+    """
+    z = z[_first_in_steps(z, _perimeter(z) / MOST)]
+    if len(z) < ENOUGH:
+        return 0.0
+    near, far = _error_between(z), _error_between(z[::2])
+    is_noise = near > max(STEADY * far, LEAST)
+    return float(np.sqrt(12 / 1.7) * near / NORMAL) if is_noise else 0.0
+
+
+def _error_between(z: ComplexArray) -> float:
+    """Return the median distance of odd points from the spline through the even ones."""
+    z = z[: len(z) // 2 * 2]
+    u = np.append(0.0, np.cumsum(np.abs(np.diff(np.append(z, z[0])))))
+    rate = _interpolated(u[::2], np.append(z[::2], z[0]))[1]
+    at, direction = rate(u[1::2], 0), rate(u[1::2], 1)
+    return float(np.median(np.abs((np.conj(direction) * (z[1::2] - at)).imag / np.abs(direction))))
 
 
 def _in_plane(xyz: Array, extent: float, grid: float) -> Array:

@@ -21,7 +21,7 @@ from der.geometry.outline import (
     PiecewiseLinear,
     reflected,
 )
-from der.geometry.points import joined, planar_points
+from der.geometry.points import joined, planar_points, unsteadiness
 from der.utils.checks import checked_array, shown
 
 CLOSED = 5e-14  # gap of a closed ring, rad and units of its length
@@ -31,6 +31,7 @@ ASYMMETRY = 2e-3  # of half the extent
 SAMPLES = 4096  # of a curve whose axes are sought
 CELLS = 64  # over which a rod of the usual mesh sees the mean of the curvature
 SIZES = 1e-3, 1e3  # of a ring's length in units of a
+NOISY = 2  # times rounding: noise is more than that
 COARSER = 4  # times the rounding of the fit that is compared
 UNSURE = 0.05  # rad; by how much tangents of two fits may differ, to count against symmetry
 EVEN = 3  # times the distance from one image: a second axis is as good
@@ -136,7 +137,10 @@ def profile_of_points(points: ArrayLike, twist_axis: str | None = None) -> Profi
     """
     z, grid = planar_points(points)
     unit = float(max(np.ptp(z.real), np.ptp(z.imag))) / 2
-    w, step = (z - z[0]) / unit, grid / unit
+    w = (z - z[0]) / unit
+    noise = unit * unsteadiness(w)
+    grid = noise if noise > NOISY * grid else grid
+    step = grid / unit
     u = np.cumsum(np.abs(np.diff(w)))
 
     def place(fraction: float) -> str:
@@ -199,7 +203,7 @@ def _chosen(axes: list[Axis], given: _Given, twist_axis: str | None) -> Axis:
     if not good:
         raise ValueError(given.asymmetric(axes[0]))
     if twist_axis == "y" and len(good) == 1:
-        raise ValueError("axis must be x for a profile with one axis of symmetry, got 'y'")
+        raise ValueError("twist_axis must be 'x' for a profile with one mirror axis, got 'y'")
     axis = min(good, key=lambda axis: axis.away)
     if twist_axis is not None or axis.away > given.near:
         spans = [axis.span for axis in good]

@@ -70,7 +70,7 @@ def read_profile(file: str, twist_axis: str | None = None) -> Ring:
         first = f" (numbers from line {table.line} on)"
         return profile(**_columns(table), twist_axis=twist_axis, resized=True)  # type: ignore[arg-type]
     except (ValueError, TypeError, RecursionError) as wrong:
-        if str(wrong).startswith("axis"):
+        if str(wrong).startswith("twist_axis"):
             raise
         raise ValueError(f"file {file!r}{first}: {wrong}") from None
 

@@ -837,6 +837,18 @@ def test_a_landscape_fills_its_folder_and_the_named_files(run):
     assert File("f.json").read_text() == File("d/landscape.json").read_text()
 
 
+def test_a_profile_of_few_points_is_warned_of(run):
+    """Eight points of an ellipse: by name, and in the summary and the record."""
+    t = 2 * np.pi * np.arange(8) / 8
+    np.savetxt("p.csv", np.column_stack([np.cos(t), 0.6 * np.sin(t)]), delimiter=";")
+    words = ("--h-over-t", "4", "--edges", "16", "--json", "p.json")
+    code, out, err = run("fold", "profile", "p.csv", "--axis", "x", *words)
+    assert code == 0
+    assert "profile (reference length 1, curvature error 0.1" in out
+    assert [line for line in err if "natural curvature known to +-1" in line]
+    assert json.loads(File("p.json").read_text())["ring"]["reference_length"] == pytest.approx(1)
+
+
 def test_a_binary_profile_is_named(run):
     """Without a word about codecs."""
     File("p.csv").write_bytes(b"\xff\xfe\x00")

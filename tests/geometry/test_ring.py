@@ -497,7 +497,7 @@ def test_bad_input_is_named(make, message):
         ({"points": 1e200 * egg(80)}, "points must have an extent from 1e-100 to 1e100"),
         ({"points": egg(80)[np.argsort(egg(80)[:, 0])]}, "once round a closed ring, in order"),
         ({"points": egg(80), "twist_axis": "z"}, "twist_axis must be 'x' or 'y', got 'z'"),
-        ({"points": egg(80), "twist_axis": "y"}, "axis must be x for a profile with one axis"),
+        ({"points": egg(80), "twist_axis": "y"}, "twist_axis must be 'x' for a profile with one"),
         ({"arc_length": [0, 7e6], "curvature": [0, 0]}, "must be in units of a and end between"),
     ],
 )
