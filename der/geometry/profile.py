@@ -6,6 +6,7 @@ changed by the little that closes it, and mirrored.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -32,9 +33,11 @@ SAMPLES = 4096  # of a curve whose axes are sought
 CELLS = 64  # over which a rod of the usual mesh sees the mean of the curvature
 SIZES = 1e-3, 1e3  # of a ring's length in units of a
 NOISY = 2  # times rounding: noise is more than that
-COARSER = 4  # times the rounding of the fit that is compared
+COARSER = 8  # times the rounding of the fit that is compared: 94 % of 180 errors were then less
 UNSURE = 0.05  # rad; by how much tangents of two fits may differ, to count against symmetry
 EVEN = 3  # times the distance from one image: a second axis is as good
+ROUNDING = 1e-12  # relative: a difference of curvatures that is none
+SLIGHT = 1e-6  # relative: an error of the curvature that is not worth a word
 SNAP = 1e-6  # of the length: knots nearer than this to an axis are on it
 ARRAYS = "arc_length and curvature"
 
@@ -47,7 +50,7 @@ class Profile:
 
     outline: PiecewiseLinear
     symmetry: str  # "C2" or "D2"
-    data: dict[str, float]  # see `DATA`
+    data: dict[str, float]  # reference_length, curvature_error, resolution: see `shapes.profile`
 
 
 @dataclass(frozen=True)
@@ -99,9 +102,14 @@ def profile_of_knots(
     curve = _closed_curve((knots, start, end), ARRAYS)
     if twist_axis is None and _asymmetry(curve, curve.length / 2) <= TYPED:
         is_even = _asymmetry(curve, curve.length / 4) <= TYPED
-        return Profile(_finished(*_first_half(curve, is_even)), "D2" if is_even else "C2", {})
-    given = _typed(curve, 1.0)
-    return replace(_mirrored(given, *_found(given, twist_axis), resized=False), data={})
+        outline = _finished(*_first_half(curve, is_even))
+        made = Profile(outline, "D2" if is_even else "C2", {})
+        error = _difference(outline, curve)
+    else:
+        given = _typed(curve, 1.0)
+        made = _mirrored(given, *_found(given, twist_axis), resized=False)
+        error = made.data["curvature_error"]
+    return replace(made, data={"curvature_error": error} if error > SLIGHT else {})
 
 
 def profile_of_curvature(
@@ -132,13 +140,15 @@ def profile_of_points(points: ArrayLike, twist_axis: str | None = None) -> Profi
 
     Notes
     -----
-    The error of the curvature is how much it changes where every other point is left out, or from
-    one half of the ring to its mirror image.
+    The error of the curvature is its change where every other point is left out and the others are
+    known `COARSER` times less, or that from a part of the ring to its mirror image. Of 90 rounded
+    and 90 noisy curves, with jumps of curvature and without, it was 0.95 to 9 times the true one
+    (5 % and 95 % quantiles, median 2.3); of 30 exact ones never less.
     """
     z, grid = planar_points(points)
     unit = float(max(np.ptp(z.real), np.ptp(z.imag))) / 2
     w = (z - z[0]) / unit
-    noise = unit * unsteadiness(w)
+    noise = float(f"{unit * unsteadiness(w):.3g}")
     grid = noise if noise > NOISY * grid else grid
     step = grid / unit
     u = np.cumsum(np.abs(np.diff(w)))
@@ -148,15 +158,18 @@ def profile_of_points(points: ArrayLike, twist_axis: str | None = None) -> Profi
         return f"at ({at.real:.6g}, {at.imag:.6g})"
 
     bends, shape = joined(w, step)
-    curve = _closed_curve(bends, "points")
-    other = _closed_curve(joined(w[::2], COARSER * step)[0], "points")
+    curve, other = _closed_curve(bends, "points"), None
+    with suppress(ValueError):  # where half of the points have lost the curve
+        other = _closed_curve(joined(w[::2], COARSER * step)[0], "points")
     near = min(abs(w[1]), abs(w[-1])) / 2 / curve.length
-    allowed = ASYMMETRY + 1.5 * step + min(UNSURE, _turned_by(curve, other))
+    unsure = UNSURE if other is None else min(UNSURE, _turned_by(curve, other))
+    allowed = ASYMMETRY + 1.5 * step + unsure
     given = _Given(curve, (curve.knots, shape), unit, allowed, near, True, "points", place)
     start, is_even = _found(given, twist_axis)
-    made = _mirrored(given, start, is_even)
-    fewer = _mirrored(replace(given, curve=other), start, is_even)
-    error = max(made.data["curvature_error"], _difference(made.outline, fewer.outline))
+    made, error = _mirrored(given, start, is_even), 1.0
+    if other is not None:
+        fewer = _mirrored(replace(given, curve=other), start, is_even)
+        error = max(made.data["curvature_error"], _difference(made.outline, fewer.outline))
     resolution = {"resolution": grid} if grid > 0 else {}
     return replace(made, data=made.data | {"curvature_error": error} | resolution)
 
@@ -282,10 +295,11 @@ def _turned_by(one: PiecewiseLinear, two: PiecewiseLinear) -> float:
 
 
 def _difference(one: PiecewiseLinear, two: PiecewiseLinear) -> float:
-    """Return how much the curvatures differ in mean squares, in means over cells, of the first."""
+    """Return the difference of the curvatures' means over cells, relative, in mean squares."""
     at = np.linspace(0, 1, CELLS + 1)
     turns = [np.diff(curve.angle(at * curve.length)) for curve in (one, two)]
-    return float(np.linalg.norm(turns[1] - turns[0]) / np.linalg.norm(turns[0]))
+    error = np.linalg.norm(turns[1] - turns[0]) / np.linalg.norm(turns[0])
+    return float(f"{error:.2g}") if error > ROUNDING else 0.0
 
 
 def _checked_bends(arc_length: ArrayLike | None, curvature: ArrayLike | None) -> Bends:

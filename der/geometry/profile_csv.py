@@ -28,7 +28,7 @@ PLACES = (
     ("x", "z"),
     ("y", "z"),
 )  # names of the coordinates of points
-LARGEST = 2**28  # bytes: seven million points
+LARGEST = 2**27  # bytes: three million points
 
 
 def read_profile(file: str, twist_axis: str | None = None) -> Ring:
@@ -53,13 +53,12 @@ def read_profile(file: str, twist_axis: str | None = None) -> Ring:
     """
     path, first = Path(file), ""
     try:
-        if path.stat().st_size > LARGEST:
-            raise ValueError(f"must have at most {LARGEST} bytes, got {path.stat().st_size}")
-        content = path.read_bytes()
+        with path.open("rb") as opened:
+            content = opened.read(LARGEST + 1)
     except OSError as wrong:
         raise ValueError(f"file must be readable, got {file!r}: {wrong.strerror}") from None
-    except ValueError as wrong:
-        raise ValueError(f"file {file!r}: {wrong}") from None
+    if len(content) > LARGEST:
+        raise ValueError(f"file must have at most {LARGEST} bytes, got more in {file!r}")
     text = _decoded(content)
     if text is None:
         raise ValueError(f"file must be a text file, got {file!r}")

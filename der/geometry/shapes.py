@@ -187,17 +187,18 @@ def profile(
     -------
     Ring
         Free of stress; its second half is exactly the mirror image of the first, and small gaps
-        (below) are closed by the smoothest change of the curvature. Its `parameters` have,
-        where a is not the user's own, "reference_length", a in the user's unit, and
-        "curvature_error", how well the natural curvature is known: relative, of means over 64 equal
-        cells, in mean squares; "resolution" is the unit to which points are rounded.
+        (below) are closed by the smoothest change of the curvature. Its `parameters` have
+        "reference_length", a in the user's unit, where that is not 1; "curvature_error", how well
+        the natural curvature is known: relative, of means over 64 equal cells, in mean squares;
+        "resolution", the unit to which points are rounded, or sqrt(12) times their noise.
 
     Raises
     ------
     ValueError
         If the input is not of this form; if the distance from the mirror image is more than 2e-3 of
-        half the extent, and 1.5 units of rounding; if the total turning is not 2 pi or the ends do
-        not meet, within 1e-2 in rad and relative to the length.
+        half the extent, 1.5 units of rounding, and what half of the points leaves open; if the
+        total turning is not 2 pi or the ends do not meet, within 1e-2 in rad and relative to the
+        length.
     """
     if twist_axis is not None:
         _oriented(1.0, twist_axis)
