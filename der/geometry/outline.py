@@ -98,10 +98,10 @@ class PiecewiseLinear:
 def _chord(u: Array, angle: Array, curvature: Array, slope: Array) -> ComplexArray:
     """Return the integral of exp(i Theta) over [0, u], Theta = angle + curvature u + slope u^2/2.
 
-    24 Gauss points are exact to rounding up to LARGEST_TURN, and five up to LITTLE_TURN.
+    24 Gauss points are exact to rounding up to LARGEST_TURN, and seven up to LITTLE_TURN.
     """
     turn = np.abs(u) * (np.abs(curvature) + np.abs(slope * u) / 2)
-    node, weight = _gauss(24 if np.max(turn, initial=0.0) > LITTLE_TURN else 5)
+    node, weight = _gauss(24 if np.max(turn, initial=0.0) > LITTLE_TURN else 7)
     v = np.multiply.outer(u, (1 + node) / 2)
     turned = v * (curvature[..., None] + slope[..., None] * v / 2)
     return u / 2 * np.exp(1j * angle) * (np.exp(1j * turned) @ weight)
