@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from der.diagram.diagram import PhaseDiagram, phase_diagram
     from der.errors import Interrupted, NotConverged, Reason
     from der.geometry.ring import Ring
-    from der.geometry.section import Scale, Section, rectangular_section, section
+    from der.geometry.scale import Scale, dimensional
+    from der.geometry.section import Section, rectangular_section, section
     from der.geometry.shapes import circle, ellipse, profile, rectangle, triangle
     from der.problem import Options
     from der.records.barriers import BarrierCurves
@@ -53,7 +54,7 @@ __all__ = [
     "Options", "Pass", "Path", "PhaseDiagram", "PlanarState", "PlanarStates", "Point", "Push",
     "Reason", "Rest", "Ring", "RingState", "RodSystem", "Saddle", "Scale", "Scene", "Section",
     "Shapes", "Squeeze", "SqueezePoint", "States", "Surface", "Timing", "Transition",
-    "__version__", "barrier", "circle", "compare", "discrete_rod", "ellipse", "energy_surface",
+    "__version__", "barrier", "circle", "compare", "dimensional", "discrete_rod", "ellipse", "energy_surface",
     "fold", "follow", "landscape", "least_push", "packing_ratio", "phase_diagram", "planar",
     "profile", "rectangle", "rectangular_section", "section", "solve_bvp", "squeeze", "states",
     "straight", "supported", "triangle",
@@ -77,7 +78,8 @@ _NAMES = {  # by the module where they live
     "der.diagram.diagram": "PhaseDiagram phase_diagram",
     "der.errors": "Interrupted NotConverged Reason",
     "der.geometry.ring": "Ring",
-    "der.geometry.section": "Scale Section rectangular_section section",
+    "der.geometry.scale": "Scale dimensional",
+    "der.geometry.section": "Section rectangular_section section",
     "der.geometry.shapes": "circle ellipse profile rectangle triangle",
     "der.problem": "Options",
     "der.records.barriers": "BarrierCurves",

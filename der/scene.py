@@ -10,6 +10,7 @@ from functools import wraps
 from numbers import Integral
 
 from der.geometry.ring import Ring
+from der.geometry.scale import THINNEST, Scale
 from der.geometry.section import Section
 from der.utils.checks import checked_number, one_of, optional, positive, shown, truth
 
@@ -23,7 +24,6 @@ _STATED = (("ring", Ring, "circle()"), ("section", Section, "rectangular_section
 
 FEWEST_EDGES = 8
 MOST_EDGES = 65_536
-THINNEST = 1e6  # a/t; above it, rounding of EA hides bending
 CROSSINGS_UP_TO = 1024  # edges; the writhe that finds self-crossings costs O(N^2)
 
 
@@ -62,6 +62,8 @@ class Scene:
     stretch : "inextensible", or "finite": EA = 12 EI1 (a_over_t / a)^2, a rectangular section's.
     a_over_t : reference length over thickness; matters for finite stretch and for drawing.
     tolerance : of the residual of an equilibrium, GJ/a.
+    scale : the ring's size and stiffness, where texts and pictures are to have units; see
+        `dimensional`.
 
     Raises
     ------
@@ -90,6 +92,7 @@ class Scene:
     stretch: str = "inextensible"
     a_over_t: float = 200.0
     tolerance: float = 1e-10
+    scale: Scale | None = None
 
     def __post_init__(self) -> None:
         for name, kind, like in _STATED:
@@ -106,6 +109,8 @@ class Scene:
             if getattr(self, name) and not self.shapes:
                 raise ValueError(f"{name} must come with shapes, got shapes=False")
         self._replace("self_crossings", optional(truth))
+        if not isinstance(self.scale, Scale | None):
+            raise ValueError(f"scale must be a der.Scale or None, got {shown(self.scale)}")
         self._check_control()
         one_of("curvature", self.curvature, MEASURES)
         one_of("stretch", self.stretch, STRETCH)

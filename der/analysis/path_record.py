@@ -80,6 +80,7 @@ def path_record(
         solver="der",
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
+        scale=scene.scale,
         numerics=numerics,
         index=counts(indices),
         index_moment=counts(map(moment_index, points, indices)),

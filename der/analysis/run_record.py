@@ -12,5 +12,6 @@ from der.utils.run import Run
 
 def run_entries(scene: Scene, run: Run) -> dict[str, Any]:
     """Return the entries of a record that tell of the ring and of the run."""
-    ring = {"ring": scene.ring.to_json(), "section": asdict(scene.section)}
-    return {"status": run.status, "message": run.message, "timing": SolveTime(run.seconds), **ring}
+    ended = {"status": run.status, "message": run.message, "timing": SolveTime(run.seconds)}
+    ring = {"ring": scene.ring.to_json(), "section": asdict(scene.section), "scale": scene.scale}
+    return ended | ring

@@ -73,6 +73,7 @@ class Followed:
             solver="bvp",
             ring=scene.ring.to_json(),
             section=asdict(scene.section),
+            scale=scene.scale,
             numerics=self._numerics(),
             **values,
             index=unknown,

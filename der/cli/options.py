@@ -25,6 +25,8 @@ SHAPES = {  # and the options that go with each
 }
 UNSURE = 0.02  # relative; of a profile's curvature, which is then warned of
 NU = 0.3  # Poisson's ratio where none is given
+A_OVER_T = 200.0
+MEASURES = ("young", "height", "thickness", "size")  # given with units, all or none
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,15 @@ class RingOptions:
     h_over_t: float | None = option("Height over thickness of the section.")
     alpha: float | None = option("EI1/GJ, with --beta.")
     beta: float | None = option("EI2/GJ, with --alpha.")
-    nu: float = option("Poisson's ratio, with --h-over-t.", NU)
-    a_over_t: float = option("Reference length over thickness: finite stretch and drawing.", 200.0)
+    nu: float = option("Poisson's ratio, with --h-over-t or --young.", NU)
+    a_over_t: float = option(
+        "Reference length over thickness: finite stretch and drawing.", A_OVER_T
+    )
+    young: str | None = option("Young's modulus with its unit, 3.5GPa: answers have units.")
+    height: str | None = option("Height of the section, with --young: 10mm.")
+    thickness: str | None = option("Thickness of the section, with --young: 1mm.")
+    size: str | None = option("Reference length a, with --young: 100mm.")
+    units: str | None = option("Of force and length in answers, with --young: N,m or N,mm ...")
 
     def ring(self) -> Ring:
         """The ring that the command line describes."""
@@ -82,13 +91,39 @@ class RingOptions:
         make: Any = {"ellipse": rings.ellipse, "rectangle": rings.rectangle}[self.shape]
         return make(**values, twist_axis=self.axis or "x")
 
+    @property
+    def is_dimensional(self) -> bool:
+        """Whether answers have units."""
+        return any(getattr(self, name) is not None for name in (*MEASURES, "units"))
+
+    def stated(self) -> dict[str, Any]:
+        """Section, a/t and scale of the scene that the command line describes."""
+        if not self.is_dimensional:
+            return {"section": self.section(), "a_over_t": self.a_over_t}
+        from der.geometry.scale import SI, dimensional
+
+        for name in ("h_over_t", "alpha", "beta"):
+            if (value := getattr(self, name)) is not None:
+                raise ValueError(f"{name} cannot be given together with --young, got {value}")
+        if self.a_over_t != A_OVER_T:
+            raise ValueError(
+                f"a_over_t cannot be given together with --young, got {self.a_over_t}: "
+                "it is --size over --thickness"
+            )
+        for name, example in zip(MEASURES, ("3.5GPa", "10mm", "1mm", "100mm"), strict=True):
+            if getattr(self, name) is None:
+                given = ", ".join(f"--{other}" for other in MEASURES)
+                raise ValueError(f"{name} must be given, such as {example}: {given} go together")
+        values = {name: getattr(self, name) for name in MEASURES}
+        return dimensional(**values, nu=self.nu, units=SI if self.units is None else self.units)
+
     def section(self) -> Section:
         """The section that the command line describes."""
         from der.geometry.section import rectangular_section, section
 
         h_over_t, alpha, beta, nu = self.h_over_t, self.alpha, self.beta, self.nu
         if h_over_t is None and nu != NU:
-            raise ValueError(f"nu can only be given together with --h-over-t, got {nu}")
+            raise ValueError(f"nu can only be given together with --h-over-t or --young, got {nu}")
         if h_over_t is not None:
             if alpha is not None or beta is not None:
                 raise ValueError(
@@ -101,7 +136,10 @@ class RingOptions:
                     raise ValueError(f"h_over_t is too extreme: {wrong} for {h_over_t}") from None
                 raise
         if alpha is None and beta is None:
-            raise ValueError("h_over_t (or both --alpha and --beta) must be given, got neither")
+            raise ValueError(
+                "h_over_t (or both --alpha and --beta, or --young with --height, --thickness and "
+                "--size) must be given, got neither"
+            )
         if alpha is None:
             raise ValueError(f"alpha must be given together with --beta {beta}, got none")
         if beta is None:
@@ -147,5 +185,4 @@ class PathOptions:
         wanted: dict[str, Any] = {n: v for n, v in vars(self).items() if v is not None}
         wanted["n_edges"] = wanted.pop("edges")
         wanted["save_at"] = numbers("save_at", self.save_at)
-        wanted["a_over_t"] = ring.a_over_t
-        return Scene(ring.ring(), ring.section(), **wanted | more)
+        return Scene(ring.ring(), **ring.stated(), **wanted | more)

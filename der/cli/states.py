@@ -29,7 +29,7 @@ class StatesOptions:
                 f"edges must be divisible by {divisor}, as the path of twisting, where the search "
                 f"starts, is followed on {part} of the ring, got {self.edges}"
             )
-        return der.Scene(ring, options.section(), n_edges=self.edges, a_over_t=options.a_over_t)
+        return der.Scene(ring, **options.stated(), n_edges=self.edges)
 
 
 def states(ring: RingOptions, wanted: StatesOptions, files: StatesFiles) -> int:
@@ -48,11 +48,25 @@ def states(ring: RingOptions, wanted: StatesOptions, files: StatesFiles) -> int:
 class PlanarOptions:
     """What is sought in the plane."""
 
-    distance: float | None = option(
-        "Squeeze or pull the flat ring until the points of its axis are so far, a."
+    distance: str | None = option(
+        "Squeeze or pull the flat ring until the points of its axis are so far: in units of a, "
+        "or with a unit where --young is given."
     )
     turns: int | None = option("Cover circles up to so many times.")
     edges: int = option("Edges of the full ring.", 256)
+
+    def goal(self, scene: der.Scene) -> float | None:
+        """The distance in units of a."""
+        if self.distance is None:
+            return None
+        if scene.scale is None:
+            try:
+                return float(self.distance)
+            except ValueError:
+                raise ValueError(f"distance must be a number, got {self.distance!r}") from None
+        from der.geometry.scale import LENGTHS, quantity
+
+        return quantity("distance", self.distance, LENGTHS, "120mm") / scene.scale.a
 
 
 def planar(ring: RingOptions, wanted: PlanarOptions, files: PlanarFiles) -> int:
@@ -60,12 +74,13 @@ def planar(ring: RingOptions, wanted: PlanarOptions, files: PlanarFiles) -> int:
     with options_named():
         if wanted.distance is not None and wanted.turns is not None:
             raise ValueError(f"turns cannot be given together with --distance, got {wanted.turns}")
-        scene = der.Scene(ring.ring(), ring.section(), n_edges=wanted.edges, error_bars=True)
+        scene = der.Scene(ring.ring(), **ring.stated(), n_edges=wanted.edges, error_bars=True)
+        distance = wanted.goal(scene)
         written = targets(files, "planar", shapes=True)
 
         def solve(_: Tick) -> Any:
-            if wanted.distance is None:
+            if distance is None:
                 return der.planar(scene, turns=wanted.turns)
-            return der.squeeze(scene, wanted.distance)
+            return der.squeeze(scene, distance)
 
         return run(solve, written, quiet=files.quiet)[1]

@@ -1,4 +1,4 @@
-"""Cross-sections: the stiffness ratios alpha and beta, and the units that undo the scaling.
+"""Cross-sections: the stiffness ratios alpha and beta.
 
 Inside the package a section is two numbers, alpha = EI1/GJ and beta = EI2/GJ; lengths are in units
 of the ring's reference length a, moments and energies in units of GJ/a.
@@ -6,7 +6,6 @@ of the ring's reference length a, moments and energies in units of GJ/a.
 
 import math
 from dataclasses import dataclass
-from typing import Self
 
 from der.utils.checks import checked_number, positive
 
@@ -14,7 +13,8 @@ SPREAD = 1e10  # of the stiffnesses, GJ among them: beyond, rounding of one hide
 ODD_ZETA_5 = 31 / 32 * 1.0369277551433699  # sum of 1/(2n-1)^5 over n >= 1, with zeta(5)
 
 
-def _poisson_ratio(value: object) -> float:
+def poisson_ratio(value: object) -> float:
+    """Return Poisson's ratio, checked."""
     return checked_number("nu", value, "a number in (-1, 0.5]", lambda number: -1 < number <= 0.5)
 
 
@@ -53,7 +53,7 @@ class Section:
         if self.h_over_t is not None:
             checked["h_over_t"] = positive("h_over_t", self.h_over_t)
         if self.nu is not None:
-            checked["nu"] = _poisson_ratio(self.nu)
+            checked["nu"] = poisson_ratio(self.nu)
         for name, number in checked.items():
             object.__setattr__(self, name, number)
         if not max(self.alpha, self.beta, 1.0) <= SPREAD * min(self.alpha, self.beta, 1.0):
@@ -111,7 +111,7 @@ def rectangular_section(h_over_t: float, nu: float = 0.3) -> Section:
     Paper, Eq. (A.16).
     """
     h_over_t = positive("h_over_t", h_over_t)
-    nu = _poisson_ratio(nu)
+    nu = poisson_ratio(nu)
     # The ratio of the softer bending stiffness to GJ; a bar on its side has h and t exchanged.
     softer = (1 + nu) / (2 * _torsion_factor(max(h_over_t, 1 / h_over_t)))
     if h_over_t >= 1:
@@ -119,6 +119,17 @@ def rectangular_section(h_over_t: float, nu: float = 0.3) -> Section:
     else:
         alpha, beta = softer / h_over_t / h_over_t, softer
     return Section(alpha, beta, h_over_t, nu)
+
+
+def torsion_constant(h: float, t: float) -> float:
+    """Return J of a rectangle of height h and thickness t, in the fourth power of their unit.
+
+    Notes
+    -----
+    Paper, Eq. (A.8); J does not change when h and t are exchanged.
+    """
+    thickness, width = sorted((positive("h", h), positive("t", t)))
+    return width * thickness**3 / 3 * _torsion_factor(width / thickness)
 
 
 def _torsion_factor(width_over_thickness: float) -> float:
@@ -132,71 +143,3 @@ def _torsion_factor(width_over_thickness: float) -> float:
         decay = math.exp(-math.pi * odd * width_over_thickness)
         defect += 2 * decay / (1 + decay) / odd**5  # 1 - tanh(x) = 2 e^-2x / (1 + e^-2x)
     return 1 - 192 / math.pi**5 / width_over_thickness * (ODD_ZETA_5 - defect)
-
-
-@dataclass(frozen=True)
-class Scale:
-    """The units of the non-dimensional numbers: multiply by them to leave for SI, divide to enter.
-
-    Parameters
-    ----------
-    moment : float
-        GJ/a, N m.
-    energy : float
-        GJ/a, J.
-    length : float
-        a, m.
-    force : float
-        GJ/a^2, N.
-
-    Raises
-    ------
-    ValueError
-        If one of them is not a finite number > 0.
-    """
-
-    moment: float
-    energy: float
-    length: float
-    force: float
-
-    def __post_init__(self) -> None:
-        for name in ("moment", "energy", "length", "force"):
-            object.__setattr__(self, name, positive(name, getattr(self, name)))
-
-    @classmethod
-    def of(cls, young_modulus: float, nu: float, h: float, t: float, a: float) -> Self:
-        """Return the units of a ring with a rectangular cross-section.
-
-        Parameters
-        ----------
-        young_modulus : float
-            E, Pa.
-        nu : float
-            Poisson's ratio, in (-1, 0.5].
-        h, t : float
-            Height and thickness of the section, m.
-        a : float
-            The ring's reference length, m.
-
-        Returns
-        -------
-        Scale
-            With GJ = E/(2(1+nu)) J.
-
-        Raises
-        ------
-        ValueError
-            If an argument is not allowed, or a unit under- or overflows.
-
-        Notes
-        -----
-        J: paper, Eq. (A.8); J does not change when h and t are exchanged.
-        """
-        young_modulus = positive("young_modulus", young_modulus)
-        nu = _poisson_ratio(nu)
-        a = positive("a", a)
-        thickness, width = sorted((positive("h", h), positive("t", t)))
-        torsion_constant = width * thickness**3 / 3 * _torsion_factor(width / thickness)
-        GJ = young_modulus / (2 * (1 + nu)) * torsion_constant
-        return cls(moment=GJ / a, energy=GJ / a, length=a, force=GJ / a / a)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from der.geometry.scale import Scale
 from der.records.entries import Checked
 from der.records.path import Path
 from der.records.record import Record
@@ -88,6 +89,11 @@ class Comparison(Record, name="comparison", plot="comparison"):
     def ring(self) -> Mapping[str, object]:  # type: ignore[override]
         """The rod's."""
         return self.rod.ring
+
+    @property
+    def scale(self) -> Scale | None:  # type: ignore[override]
+        """The rod's."""
+        return self.rod.scale
 
     @property
     def solve_s(self) -> float:

@@ -13,10 +13,21 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from der.geometry.scale import Scale
 from der.records.entries import Checked, in_memory
 from der.records.path import Path, Timing
 from der.records.record import Record, SolveTime, Status
-from der.records.values import Count, Estimates, Json, Number, Text, Texts, Truth, table
+from der.records.values import (
+    Count,
+    Estimates,
+    Json,
+    Number,
+    ScaleEntry,
+    Text,
+    Texts,
+    Truth,
+    table,
+)
 from der.utils.checks import Array
 
 # --- Along the path of twisting --------------------------------------------------------------
@@ -91,7 +102,7 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
         """The entries of the path, without those that never differ, and the other entries."""
         path = entries.pop("path")
-        first = {name: path[name] for name in _OF_PATH}
+        first = {name: path[name] for name in _OF_PATH if name in path}
         last = {"why": entries["barriers"].pop("why"), "extrapolated": entries.pop("extrapolated")}
         return super().on_disk(first | entries | last | {"timing": path["timing"]})
 
@@ -114,6 +125,11 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
     def ring(self) -> Mapping[str, object]:  # type: ignore[override]
         """The path's."""
         return self.path.ring
+
+    @property
+    def scale(self) -> Scale | None:  # type: ignore[override]
+        """The path's."""
+        return self.path.scale
 
     @property
     def status(self) -> str:
@@ -141,7 +157,7 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
         return tuple(rest for rest in self.rests if rest.kind == "saddle")
 
 
-_ABOUT = ("status", "message", "reason", "ring", "section", "numerics")
+_ABOUT = ("status", "message", "reason", "ring", "section", "numerics", "scale")
 _OF_PATH = (*_ABOUT, "gamma", "energy", "moment", "index", "index_moment", "points")
 _OWN = ("rests", "folded", "barriers", "why", "extrapolated")
 
@@ -177,6 +193,7 @@ class Pass(Record, name="barrier of the free ring", kind="pass", plot="minimum_e
     ring: Json
     section: Json
     numerics: Json
+    scale: ScaleEntry | None = None
     barriers: Heights
     twisting: Barriers  # the same in clamped grips that turn freely
     saddle: Saddle | None  # the one that is crossed

@@ -12,7 +12,18 @@ from typing import Annotated, Any
 
 from der.records.entries import Checked, Entry, in_memory
 from der.records.record import Record, SolveTime, Status
-from der.records.values import Count, Estimates, Json, Number, Text, Truth, numbers, one_of, table
+from der.records.values import (
+    Count,
+    Estimates,
+    Json,
+    Number,
+    ScaleEntry,
+    Text,
+    Truth,
+    numbers,
+    one_of,
+    table,
+)
 from der.utils import checks
 from der.utils.checks import Array
 
@@ -86,6 +97,7 @@ class LeastPush(Record, name="least push", kind="push", plot="opening"):
     ring: Json
     section: Json
     numerics: Json
+    scale: ScaleEntry | None = None
     barrier: Number | None  # of the free ring, to open: no slow push takes less
     twisting: Number | None  # in clamped grips that turn freely
     least: Positions  # by kind, position of the slow push of least work

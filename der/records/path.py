@@ -18,8 +18,19 @@ import numpy as np
 from der.errors import Reason
 from der.records.configurations import Shapes
 from der.records.entries import Checked, in_memory
-from der.records.record import Record, SolveTime, Status
-from der.records.values import Column, Count, Json, Number, Text, Truth, along, indices, one_of
+from der.records.record import SPARSE, Record, SolveTime, Status
+from der.records.values import (
+    Column,
+    Count,
+    Json,
+    Number,
+    ScaleEntry,
+    Text,
+    Truth,
+    along,
+    indices,
+    one_of,
+)
 from der.utils import checks
 from der.utils.checks import Array, Counts, optional
 
@@ -112,7 +123,7 @@ class Path(Record, name="path", plot="path"):
         If lengths, kinds or types are others, or a number is not finite; the message names it.
     """
 
-    OPTIONAL: ClassVar[tuple[str, ...]] = ("status", "message", "reason", "raw")
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("status", "message", "reason", *SPARSE)
 
     solver: Annotated[str, one_of(SOLVERS)]
     status: Status = "done"  # the states of an incomplete path are good
@@ -121,6 +132,7 @@ class Path(Record, name="path", plot="path"):
     ring: Json  # the statement, as in its JSON form
     section: Json
     numerics: Json
+    scale: ScaleEntry | None = None  # None: not dimensional
     gamma: Column  # (n,) rad, in path order; with error bars the extrapolated values
     moment: Annotated[Array, along("gamma")]  # GJ/a, of one arm
     energy: Annotated[Array, along("gamma")]  # GJ/a, of the full ring
@@ -150,12 +162,6 @@ class Path(Record, name="path", plot="path"):
         for i, point in enumerate(self.points):
             if point.position >= len(self):
                 raise ValueError(f"points[{i}].position is {point.position} of {len(self)} states")
-
-    def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
-        """The entries, without the raw values where there are none."""
-        if self.raw is None:
-            del entries["raw"]
-        return super().on_disk(entries)
 
     def __len__(self) -> int:
         return len(self.gamma)

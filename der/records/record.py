@@ -16,9 +16,11 @@ from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
+from der.geometry.scale import Scale
 from der.records.codec import record_of
 from der.records.entries import Checked, plain
-from der.records.values import Json, Number, Text, one_of
+from der.records.units import in_units
+from der.records.values import Json, Number, ScaleEntry, Text, one_of
 from der.utils.checks import shown
 from der.utils.files import FilePath, Saved, json_entries, json_lines
 
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 STATUSES = ("done", "not converged", "interrupted")
 LARGEST = 2**28  # bytes of a file that is read: a thousand times what a long path takes
+SPARSE = ("raw", "scale", "forces")  # entries that are left out of a file where they are None
 Status = Annotated[str, one_of(STATUSES)]
 
 
@@ -103,8 +106,11 @@ class Record(Checked, Shown, Saved):
     KIND: ClassVar[str] = ""  # the first entry; "": the file has none
     PLOT: ClassVar[str]  # the module of der.viz.plots whose function `draw` makes the figure
 
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("scale",)
+
     ring: Mapping[str, object]
     timing: SolveTime
+    scale: Scale | None = None  # None: not dimensional
 
     def __init_subclass__(cls, *, name: str = "", kind: str = "", plot: str = "") -> None:
         super().__init_subclass__()
@@ -149,6 +155,9 @@ class Record(Checked, Shown, Saved):
     def on_disk(self, entries: dict[str, Any]) -> dict[str, Any]:
         """The entries after kind and schema."""
         first = {"kind": self.KIND} if self.KIND else {}
+        for name in SPARSE:
+            if entries.get(name, self) is None:
+                del entries[name]
         return first | {"schema": SCHEMA} | super().on_disk(entries)
 
     @classmethod
@@ -172,7 +181,7 @@ class Record(Checked, Shown, Saved):
 
     def figure(self) -> Figure:
         """The matplotlib figure of the record."""
-        figure: Figure = import_module(f"der.viz.plots.{self.PLOT}").draw(self)
+        figure: Figure = import_module(f"der.viz.plots.{self.PLOT}").draw(in_units(self))
         return figure
 
     def _all_facts(self) -> list[str]:
@@ -189,6 +198,7 @@ class RingRecord(Record):
     ring: Json
     section: Json
     numerics: Json
+    scale: ScaleEntry | None = None
 
 
 def _decoded(content: bytes) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
 from typing import Annotated, Any
 
 import numpy as np
 
+from der.geometry.scale import Scale
 from der.records.entries import Check, Entry
 from der.utils import checks
 from der.utils.checks import Array
@@ -30,6 +32,22 @@ Integer = Annotated[int, Entry(integer)]
 Text = Annotated[str, Entry(checks.text)]
 Truth = Annotated[bool, Entry(checks.truth)]
 Json = Annotated[Mapping[str, object], Entry(checks.json_object)]
+
+
+def _scale(name: str, value: object) -> Scale:
+    if isinstance(value, Scale):
+        return value
+    entries = checks.json_object(name, value)
+    wanted = [one.name for one in fields(Scale)]
+    if set(entries) != set(wanted):
+        raise ValueError(f"{name} must have the entries {', '.join(wanted)}")
+    try:
+        return Scale(**entries)
+    except ValueError as wrong:
+        raise ValueError(f"{name}.{wrong}") from None
+
+
+ScaleEntry = Annotated[Scale, Entry(_scale, asdict)]
 
 
 def nested(check: Check, depth: int) -> Check:

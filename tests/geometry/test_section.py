@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from der.geometry.section import Scale, Section, rectangular_section, section
+from der.geometry.scale import Scale
+from der.geometry.section import Section, rectangular_section, section
 
 
 def torsion_series(h_over_t: float, n_terms: int = 20_000) -> float:
@@ -123,7 +124,7 @@ def test_scale_does_not_tell_height_from_thickness():
         (lambda: Section(1, 1, nu=2), "nu must be a number in (-1, 0.5], got 2"),
         (lambda: Scale.of(0, 0.3, 1, 1, 1), "young_modulus must be a finite number > 0, got 0"),
         (lambda: Scale.of(1, 0.3, 1, 1, math.nan), "a must be a finite number > 0, got nan"),
-        (lambda: Scale.of(1, 0.3, 1, 1e-200, 1), "moment must be a finite number > 0, got 0.0"),
+        (lambda: Scale.of(1, 0.3, 1, 1e-200, 1), "GJ must be a finite number > 0, got 0.0"),
     ],
 )
 def test_bad_input_is_named(make, message):

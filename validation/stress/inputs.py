@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from der.geometry.section import Scale, Section, rectangular_section, section
+from der.geometry.scale import Scale
+from der.geometry.section import Section, rectangular_section, section
 from der.geometry.shapes import circle, ellipse, profile, rectangle, ring_from_json, triangle
 from der.records.path import Path
 from der.scene import Scene

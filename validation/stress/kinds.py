@@ -16,7 +16,7 @@ from der.analysis import fold as folding
 from der.analysis.request import Request, ring_of
 from der.bvp.solve import solve_bvp
 from der.errors import NotConverged
-from der.geometry.section import Scale
+from der.geometry.scale import Scale
 from der.kernels.assembly import assemble
 from der.kernels.linking import link
 from der.records.configurations import Shapes

@@ -97,6 +97,7 @@ def _pass(scene: Scene, run: Run) -> Pass:
     return Pass(
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
+        scale=scene.scale,
         numerics=mesh_numerics(scene, ring_of(scene)),
         barriers=heights,
         twisting=twisted.barriers,

@@ -78,6 +78,7 @@ def least_push(
         why=why,
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
+        scale=scene.scale,
         numerics=mesh_numerics(scene, ring_of(scene, "full")) | {"points": grid},
         barrier=free.open,
         twisting=free.twisting.open,

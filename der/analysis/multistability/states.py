@@ -196,6 +196,7 @@ def record(scene: Scene, full: GrippedRing, search: Search, gamma: float | None)
     return States(
         ring=scene.ring.to_json(),
         section=asdict(scene.section),
+        scale=scene.scale,
         numerics={**mesh_numerics(scene, full), "count": search.count},
         gamma=gamma,
         states=tuple(described(full, *row) for row in rows),

@@ -10,6 +10,7 @@ from importlib import import_module
 
 from der.records.path import Path
 from der.records.record import Record
+from der.records.units import in_units
 
 _HOME = {  # the module that tells a record, by the name of its class
     "Path": "path",
@@ -33,7 +34,7 @@ def summary(record: Record, *, why: bool = True) -> str:
     why : whether the last line says why something is missing.
     """
     home = import_module(f"der.records.text.{_HOME[type(record).__name__]}")
-    lines: list[str] = home.lines(record)
+    lines: list[str] = home.lines(in_units(record))
     status = getattr(record, "status", "done")
     last = ["" if status == "done" else status, reason(record) if why else ""]
     if any(last) and not isinstance(record, Path):  # which says it above its points

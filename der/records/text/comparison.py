@@ -5,28 +5,30 @@ from __future__ import annotations
 import math
 
 from der.records.comparison import Comparison
-from der.records.text.table import table
-
-_HEADS = (
-    ("", -8),
-    ("gamma", 12),
-    ("M rod", 14),
-    ("M bvp", 14),
-    ("distance", 11),
-    ("bar", 10),
-    ("", 0),
-)
+from der.records.text.path import ONE_ARM
+from der.records.text.table import form, table
+from der.records.units import unit
 
 
 def lines(found: Comparison) -> list[str]:
     """The differences at the states that were asked for, and at folds and limits."""
-    asked = _asked(found)
+    asked, digits = _asked(found), form(found, ".9f")
+    moment = "" if found.scale is None else f" [{unit(found.scale, 'moment')}]"
+    heads = (
+        ("", -8),
+        ("gamma", 12),
+        (f"M rod{moment}", 16 if moment else 14),
+        (f"M bvp{moment}", 16 if moment else 14),
+        ("distance", 11),
+        ("bar", 10),
+        ("", 0),
+    )
     rows = [
         (
             state.kind,
             f"{state.gamma:.8f}",
-            f"{state.rod_moment:.9f}",
-            f"{state.bvp_moment:.9f}",
+            f"{state.rod_moment:{digits}}",
+            f"{state.bvp_moment:{digits}}",
             f"{state.moment_distance:.1e}",
             "" if state.moment_bar is None else f"{state.moment_bar:.1e}",
             "  beyond" if state.agrees is False else "",
@@ -34,15 +36,17 @@ def lines(found: Comparison) -> list[str]:
         for state in found.states
         if state.kind or state.gamma in asked
     ]
-    told = table(_HEADS, rows)
+    told = [*table(heads, rows), ONE_ARM]
     for pair in found.pairs:
         bar = "" if pair.bar is None else f", bar {pair.bar:.1e}"
         told.append(
             f"{pair.kind:8}{pair.rod_gamma:12.8f}{'':14}{pair.bvp_gamma:12.8f} by bvp: "
             f"{pair.difference:.1e} rad apart{bar}"
         )
-    moment, energy = found.largest
-    told.append(f"largest normal distance: {moment:.1e} in M, {energy:.1e} in U (scaled planes)")
+    in_moment, in_energy = found.largest
+    told.append(
+        f"largest normal distance: {in_moment:.1e} in M, {in_energy:.1e} in U (scaled planes)"
+    )
     if not math.isnan(found.within):
         told.append(f"{100 * found.within:.1f} % of the states agree within their error bars")
     if found.unmatched:

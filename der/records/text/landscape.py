@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from der.records.energy_surface import Surface
-from der.records.landscape import Landscape, Pass
-from der.records.text.table import count, floor, number, table, title
-
-_HEADS = (
-    ("M = 0", -8),
-    ("gamma", 12),
-    ("U a/GJ", 14),
-    ("dM/dgamma", 12),
-    ("  index, moment held", 0),
-)
+from der.records.landscape import Barriers, Heights, Landscape, Pass
+from der.records.text.table import column, count, floor, form, number, table, title
+from der.records.units import unit
 
 
 def lines(found: Landscape | Surface | Pass) -> list[str]:
@@ -26,19 +17,27 @@ def lines(found: Landscape | Surface | Pass) -> list[str]:
 
 def _landscape(found: Landscape) -> list[str]:
     least = floor(found.path)
+    slope = "dM/dgamma" if found.scale is None else f"dM/dgamma [{unit(found.scale, 'moment')}]"
+    heads = (
+        ("M = 0", -8),
+        ("gamma", 12),
+        column(found, "U", "energy", 14),
+        (slope, 12 if found.scale is None else 20),
+        ("  index, moment held", 0),
+    )
     rows = [
         (
             rest.kind,
             f"{rest.gamma:.8f}",
-            number(rest.energy, ".8f", least),
-            number(rest.slope, ".6f"),
+            number(rest.energy, form(found, ".8f"), least),
+            number(rest.slope, form(found, ".6f")),
             f"  {count(rest.index_moment)}, grips removed {count(rest.index_free)}",
         )
         for rest in found.rests
     ]
     barriers = found.barriers
-    known = barriers_text(barriers.fold, barriers.open, found.extrapolated)
-    told = [title(found.path), *(["", *table(_HEADS, rows)] if rows else []), "", *known]
+    known = barriers_text(found, barriers)
+    told = [title(found.path), *(["", *table(heads, rows)] if rows else []), "", *known]
     for said in dict.fromkeys(barriers.why.values()):
         if said != found.path.message:
             names = [name for name, why in barriers.why.items() if why == said]
@@ -47,40 +46,42 @@ def _landscape(found: Landscape) -> list[str]:
 
 
 def barriers_text(
-    fold: float | None,
-    opened: float | None,
-    extrapolated: Mapping[str, tuple[float, float]],
-    how: str = "",
+    found: Landscape | Pass, barriers: Barriers | Heights, how: str = "", *, mesh: bool = False
 ) -> list[str]:
-    """Barriers, extrapolated where that was done; ``how`` the ring is held."""
-    told = []
-    for name, value in (("fold", fold), ("open", opened)):
-        text = "none" if value is None else f"{value:.8g} GJ/a on the mesh"
-        if name in extrapolated:
-            height, error = extrapolated[name]
-            text += f", {height:.8g} +- {error:.1e} GJ/a extrapolated"
+    """Barriers, extrapolated where that was done; ``how`` the ring is held.
+
+    ``mesh``: of the mesh alone.
+    """
+    told, energy = [], unit(found.scale, "energy")
+    for name in ("fold", "open"):
+        value = getattr(barriers, name)
+        text = "none" if value is None else f"{value:.8g} {energy} on the mesh"
+        if name in found.extrapolated and not mesh:
+            height, error = found.extrapolated[name]
+            text += f", {height:.8g} +- {error:.1e} {energy} extrapolated"
         told.append(f"barrier to {name}{how}: {text}")
     return told
 
 
 def _surface(found: Surface) -> list[str]:
     n, m = found.energy.shape
+    length = "" if found.scale is None else f" {unit(found.scale, 'length')}"
     several, none = int((found.count > 1).sum()), int((found.count == 0).sum())
     return [
         f"{n} x {m} cells, gamma to {found.gamma[-1]:.4g}, "
-        f"distance {found.distance[0]:.4g} to {found.distance[-1]:.4g}: {several} "
+        f"distance {found.distance[0]:.4g} to {found.distance[-1]:.4g}{length}: {several} "
         f"with several minima, {none} with none, {found.solve_s:.1f} s"
     ]
 
 
 def _pass(found: Pass) -> list[str]:
-    told = barriers_text(found.fold, found.open, found.extrapolated, " of the free ring")
+    told = barriers_text(found, found.barriers, " of the free ring")
     saddle = found.saddle
     if saddle is not None:
         told.append(
-            f"saddle: U = {saddle.energy:.8g} GJ/a, index {count(saddle.index)}, "
+            f"saddle: U = {saddle.energy:.8g} {unit(found.scale, 'energy')}, index {count(saddle.index)}, "
             f"residual {saddle.residual:.1e}, between {' and '.join(saddle.ends)}"
             + (", that of twisting" if saddle.twisted else "")
         )
-    twisting = barriers_text(found.twisting.fold, found.twisting.open, {})
+    twisting = barriers_text(found, found.twisting, mesh=True)
     return [*told, "in clamped grips that turn freely:", *(f"  {line}" for line in twisting)]

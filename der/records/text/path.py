@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from der.records.path import AtPi, Mode, Path, Point
-from der.records.text.table import change, floor, number, table, title
+from der.records.text.table import change, column, floor, form, number, table, title
+from der.records.units import unit
 
 _FAR = 1e-2  # rad: a snap over more, under a dead moment, says where it began
-_HEADS = (("", -9), ("gamma", 12), ("gamma/pi", 10), ("M a/GJ", 12), ("U a/GJ", 12), ("  index", 0))
+ONE_ARM = "M: moment of one arm; a torque cell on one grip reads 2 M"
 
 
 def lines(path: Path) -> list[str]:
@@ -23,9 +24,19 @@ def lines(path: Path) -> list[str]:
     if path.message:
         found.append(path.message if path.status == "done" else f"{path.status}: {path.message}")
     if path.points:
-        found += ["", *table(_HEADS, map(_row, path.points))]
+        heads = (
+            ("", -9),
+            ("gamma", 12),
+            ("gamma/pi", 10),
+            column(path, "M", "moment", 12),
+            column(path, "U", "energy", 12),
+            ("  index", 0),
+        )
+        found += ["", *table(heads, [_row(point, form(path, ".7f")) for point in path.points])]
     if path.at_pi is not None:
-        found += ["", _at_pi(path.at_pi, floor(path))]
+        found += ["", _at_pi(path.at_pi, path)]
+    if path.points or path.at_pi is not None:
+        found.append(ONE_ARM)
     if path.error is not None:
         found.append(_errors(path))
     t = path.timing
@@ -48,7 +59,7 @@ def mode_text(mode: Mode) -> str:
     return ", ".join(parts)
 
 
-def _row(point: Point) -> tuple[str, ...]:
+def _row(point: Point, digits: str) -> tuple[str, ...]:
     index = change(point.index_before, point.index_after)
     extra = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in point.details.items())
     if point.kind == "snap":
@@ -60,17 +71,26 @@ def _row(point: Point) -> tuple[str, ...]:
         point.kind,
         number(point.gamma, ".8f"),
         number(point.gamma / math.pi, ".6f"),
-        number(point.moment, ".7f"),
-        number(point.energy, ".7f"),
+        number(point.moment, digits),
+        number(point.energy, digits),
         f"  {index:7} {extra}",
     )
 
 
-def _at_pi(at: AtPi, least: float) -> str:
+def _at_pi(at: AtPi, path: Path) -> str:
     names = {"index": at.index, "moment held": at.index_moment, "grips removed": at.index_free}
     index = ", ".join(f"{n} {'unknown' if i is None else i}" for n, i in names.items())
+    least = floor(path)
     moment, energy = number(at.moment, ".7g", least), number(at.energy, ".10g", least)
-    return f"at pi: M = {moment}, dM/dgamma = {at.slope:.7g}, U = {energy}; {index}"
+    in_moment, in_energy = (
+        ("", "")
+        if path.scale is None
+        else (f" {unit(path.scale, name)}" for name in ("moment", "energy"))
+    )
+    return (
+        f"at pi: M = {moment}{in_moment}, dM/dgamma = {at.slope:.7g}{in_moment}, "
+        f"U = {energy}{in_energy}; {index}"
+    )
 
 
 def _errors(path: Path) -> str:
@@ -78,8 +98,10 @@ def _errors(path: Path) -> str:
     bars: Mapping[str, Any] = path.error or {}
     largest = {n: max((e for e in bars[n] if e is not None), default=0.0) for n in _BARS}
     missing = sum(e is None for e in bars["moment"])
+    units = {} if path.scale is None else {n: f" {unit(path.scale, n)}" for n in _BARS[1:]}
+    parts = [f"{n} {e:.1e}{units.get(n, '')}" for n, e in largest.items()]
     none = f"; none at {missing} of {len(path)} states" if missing else ""
-    return f"error bars, at most: {', '.join(f'{n} {e:.1e}' for n, e in largest.items())}{none}"
+    return f"error bars, at most: {', '.join(parts)}{none}"
 
 
 _BARS = ("gamma", "moment", "energy")

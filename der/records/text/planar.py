@@ -5,18 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from der.records.planar import PlanarStates, Squeeze
-from der.records.text.table import change, count, error, floor, number, table, title
+from der.records.text.table import change, column, count, error, floor, form, number, table, title
 
 _ROWS = 12  # of a path, at most
-_SQUEEZE = (
-    ("distance a", 12),
-    ("F a^2/GJ", 15),
-    ("+-", 9),
-    ("U a/GJ", 15),
-    ("+-", 9),
-    ("index", 7),
-    ("", 0),
-)
 
 
 def lines(found: PlanarStates | Squeeze) -> list[str]:
@@ -36,19 +27,19 @@ def _states(found: PlanarStates) -> list[str]:
     heads = [
         ("state", -wide),
         ("turns", 5),
-        ("U a/GJ", 16),
+        column(found, "U", "energy", 16),
         ("+-", 9),
         ("index", 7),
-        ("F a^2/GJ", 13),
+        column(found, "F", "force", 13),
     ]
     rows = (
         (
             state.name,
             str(state.turning),
-            number(state.energy, ".9f", least),
+            number(state.energy, form(found, ".9f"), least),
             error(state.energy_error),
             count(state.index),
-            ("*" if state.zero_modes else " ") + number(state.force, "12.6f", least),
+            ("*" if state.zero_modes else " ") + number(state.force, form(found, "12.6f"), least),
         )
         for state in found.states
     )
@@ -65,7 +56,16 @@ def _states(found: PlanarStates) -> list[str]:
 
 def _path(found: Squeeze) -> list[str]:
     """Some of the states, and the special points."""
-    least = floor(found)
+    least, digits = floor(found), form(found, ".8f")
+    heads = (
+        column(found, "distance", "length", 12),
+        column(found, "F", "force", 15),
+        ("+-", 9),
+        column(found, "U", "energy", 15),
+        ("+-", 9),
+        ("index", 7),
+        ("", 0),
+    )
     wanted = set(np.linspace(0, len(found) - 1, min(_ROWS, len(found))).round().astype(int))
     marks = {_nearest(found, point.distance, point.energy): point for point in found.points}
     rows = []
@@ -74,16 +74,16 @@ def _path(found: Squeeze) -> list[str]:
         own = count(found.index[k])
         rows.append(
             (
-                number(float(found.distance[k]), ".8f"),
-                number(float(found.force[k]), ".8f", least),
+                number(float(found.distance[k]), digits),
+                number(float(found.force[k]), digits, least),
                 error(found.force_error[k]),
-                number(float(found.energy[k]), ".8f", least),
+                number(float(found.energy[k]), digits, least),
                 error(found.energy_error[k]),
                 own if point is None else change(point.index_before, point.index_after, "->"),
                 "" if point is None else f"  {point.kind}",
             )
         )
-    return [*table(_SQUEEZE, rows), "", "F: draws the points apart; below 0 it holds them together"]
+    return [*table(heads, rows), "", "F: draws the points apart; below 0 it holds them together"]
 
 
 def _nearest(found: Squeeze, distance: float, energy: float) -> int:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from der.records.states import RingState, States
-from der.records.text.table import count, floor, number, table, title
+from der.records.text.path import ONE_ARM
+from der.records.text.table import column, count, floor, form, number, table, title
 
 
 def lines(found: States) -> list[str]:
@@ -13,8 +14,10 @@ def lines(found: States) -> list[str]:
     gripped = found.gamma is not None
     place = f"grips at gamma = {found.gamma:.8g}" if gripped else "free in space"
     wide = max([len(state.name) for state in found.states], default=5) + 2
-    more = [("M a/GJ", 12), ("distance a", 12)] if gripped else []
-    heads = [("state", -wide), ("U a/GJ", 14), ("index", 7), *more, ("link", 6), ("  snaps to", 0)]
+    moment, distance = column(found, "M", "moment", 12), column(found, "distance", "length", 12)
+    more = [moment, distance] if gripped else []
+    energy = column(found, "U", "energy", 14)
+    heads = [("state", -wide), energy, ("index", 7), *more, ("link", 6), ("  snaps to", 0)]
     rows = table(heads, (_row(found, state) for state in found.states))
     return [f"{title(found)}, {place}", "", *rows, "", _search(found), *_notes(found)]
 
@@ -23,7 +26,10 @@ def _row(found: States, state: RingState) -> list[str]:
     least = floor(found)
     gripped = []
     if found.gamma is not None and state.moment is not None and state.distance is not None:
-        gripped = [number(state.moment, ".7f", least), number(state.distance, ".5f")]
+        gripped = [
+            number(state.moment, form(found, ".7f"), least),
+            number(state.distance, form(found, ".5f")),
+        ]
     ends = ", ".join(
         f"{end} ({number(state.energy - found[end].energy, '.6g', least)})"
         for end in found.falls_to(state.name)
@@ -31,7 +37,14 @@ def _row(found: States, state: RingState) -> list[str]:
     link = "" if state.link is None else str(state.link)
     mark = "c" if state.needs_cut else " "
     end = f"{mark} {ends or ('stays' if state.stable else '?')}"
-    return [state.name, number(state.energy, ".8f"), count(state.index), *gripped, link, end]
+    return [
+        state.name,
+        number(state.energy, form(found, ".8f")),
+        count(state.index),
+        *gripped,
+        link,
+        end,
+    ]
 
 
 def _search(found: States) -> str:
@@ -52,4 +65,5 @@ def _notes(found: States) -> Iterator[str]:
     if any(state.needs_cut for state in found.states):
         yield "c: the other frame class: only after a cut, one turn of an end, and a new joint"
     if found.gamma is not None and len(found):
-        yield "distance: between the grips, in units of a"
+        yield f"distance: between the grips{', in units of a' if found.scale is None else ''}"
+        yield ONE_ARM

@@ -6,6 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from der.geometry.scale import Scale
+from der.records.units import factor, head
+
+WIDE = 15  # of a column of numbers with units
 KNOWN = 1e-10  # GJ/a: of numbers whose record says no tolerance
 
 
@@ -32,6 +36,16 @@ def number(value: float, form: str, floor: float = 0.0) -> str:
     return f"{0.0:{form}}" if abs(value) <= floor or float(text) == 0.0 else text
 
 
+def column(record: Any, symbol: str, quantity: str, width: int) -> tuple[str, int]:
+    """The head of a column of numbers, and its width."""
+    return head(record.scale, symbol, quantity), width if record.scale is None else WIDE
+
+
+def form(record: Any, plain: str) -> str:
+    """The format of a number that may have a unit, and so any size: significant digits."""
+    return plain if record.scale is None else ".7g"
+
+
 def count(index: int | None) -> str:
     """An index, or "?" where it is not known."""
     return "?" if index is None else str(index)
@@ -51,15 +65,24 @@ def error(value: float | None) -> str:
 
 
 def floor(record: Any) -> float:
-    """What moments and energies of a record are known to, GJ/a, by the tolerance on record."""
-    return float(record.numerics.get("tolerance", KNOWN))
+    """What moments and energies of a record are known to, by the tolerance on record."""
+    known = float(record.numerics.get("tolerance", KNOWN))  # GJ/a
+    return known * factor(record.scale, "moment")
 
 
 def title(record: Any) -> str:
     """Ring, section and mesh of a record in one line."""
     edges = record.numerics.get("n_edges")  # a boundary-value solution has none
     mesh = "" if edges is None else f", {edges} edges"
-    return f"{_ring(record.ring)}, {_section(record.section)}{mesh}"
+    return f"{_ring(record.ring)}, {_section(record.section)}{mesh}{_size(record.scale)}"
+
+
+def _size(scale: Scale | None) -> str:
+    """The reference length and the stiffness where they are known."""
+    if scale is None:
+        return ""
+    length, name = scale.unit("length")
+    return f", a = {length:.6g} {name}, GJ = {scale.GJ:.6g} N m^2"
 
 
 def _ring(ring: Mapping[str, Any]) -> str:
