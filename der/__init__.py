@@ -54,10 +54,10 @@ __all__ = [
     "Options", "Pass", "Path", "PhaseDiagram", "PlanarState", "PlanarStates", "Point", "Push",
     "Reason", "Rest", "Ring", "RingState", "RodSystem", "Saddle", "Scale", "Scene", "Section",
     "Shapes", "Squeeze", "SqueezePoint", "States", "Surface", "Timing", "Transition",
-    "__version__", "barrier", "circle", "compare", "dimensional", "discrete_rod", "ellipse", "energy_surface",
-    "fold", "follow", "landscape", "least_push", "packing_ratio", "phase_diagram", "planar",
-    "profile", "rectangle", "rectangular_section", "section", "solve_bvp", "squeeze", "states",
-    "straight", "supported", "triangle",
+    "__version__", "barrier", "circle", "compare", "dimensional", "discrete_rod", "ellipse",
+    "energy_surface", "fold", "follow", "landscape", "least_push", "packing_ratio",
+    "phase_diagram", "planar", "profile", "rectangle", "rectangular_section", "section",
+    "solve_bvp", "squeeze", "states", "straight", "supported", "triangle",
 ]
 # fmt: on
 

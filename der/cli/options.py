@@ -91,14 +91,12 @@ class RingOptions:
         make: Any = {"ellipse": rings.ellipse, "rectangle": rings.rectangle}[self.shape]
         return make(**values, twist_axis=self.axis or "x")
 
-    @property
-    def is_dimensional(self) -> bool:
-        """Whether answers have units."""
-        return any(getattr(self, name) is not None for name in (*MEASURES, "units"))
-
     def stated(self) -> dict[str, Any]:
         """Section, a/t and scale of the scene that the command line describes."""
-        if not self.is_dimensional:
+        given = [name for name in MEASURES if getattr(self, name) is not None]
+        if not given:
+            if self.units is not None:
+                raise ValueError(f"units must go with --young, got {self.units!r} alone")
             return {"section": self.section(), "a_over_t": self.a_over_t}
         from der.geometry.scale import SI, dimensional
 
@@ -111,9 +109,10 @@ class RingOptions:
                 "it is --size over --thickness"
             )
         for name, example in zip(MEASURES, ("3.5GPa", "10mm", "1mm", "100mm"), strict=True):
-            if getattr(self, name) is None:
-                given = ", ".join(f"--{other}" for other in MEASURES)
-                raise ValueError(f"{name} must be given, such as {example}: {given} go together")
+            if name not in given:
+                raise ValueError(
+                    f"{name} must be given with --{given[0]}, such as {example}, got none"
+                )
         values = {name: getattr(self, name) for name in MEASURES}
         return dimensional(**values, nu=self.nu, units=SI if self.units is None else self.units)
 

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from der.geometry.scale import Scale
 from der.records.configurations import Fall, Shapes
 from der.records.path import Path
+from der.records.units import factor
 from der.utils import checks
 from der.utils.checks import Array
 
@@ -47,6 +49,7 @@ class Motion:
     classes: tuple[str, ...]  # (m,) symmetry classes of the softest modes
     eigenvalues: Array  # (n, m); nan within a snap
     u: Array | None  # (n, N, 3) displacements in the softest mode; nan within a snap
+    scale: Scale | None  # None: energies in GJ/a; else in its units, as those of the path
 
     @property
     def size(self) -> float:
@@ -68,7 +71,7 @@ def animate(path: Path, *, rest: Array | None = None) -> Motion:
 
     Parameters
     ----------
-    path : with shapes.
+    path : with shapes; as it is shown (`in_units`).
     rest : (N, 3) natural strains of the vertices, integrated [rad]; None for a path that begins
         flat: those of its first state, times the natural curvature.
 
@@ -90,12 +93,12 @@ def animate(path: Path, *, rest: Array | None = None) -> Motion:
     order = _order(n, snaps)
     position = np.where(order < n, order, -1)
     x, frames, gamma, energy = (
-        np.concatenate([states, *(getattr(snap, name) for snap in snaps)])[order]
-        for name, states in (
-            ("x", shapes.x),
-            ("frames", shapes.frames),
-            ("gamma", path.gamma),
-            ("energy", path.energy),
+        np.concatenate([states, *(times * getattr(snap, name) for snap in snaps)])[order]
+        for name, states, times in (
+            ("x", shapes.x, 1.0),
+            ("frames", shapes.frames, 1.0),
+            ("gamma", path.gamma, 1.0),
+            ("energy", path.energy, factor(path.scale, "energy")),
         )
     )
     values = np.empty((n, 0)) if softest is None else softest.eigenvalues
@@ -106,11 +109,12 @@ def animate(path: Path, *, rest: Array | None = None) -> Motion:
         gamma=gamma,
         moment=spread(path.moment, position),
         energy=energy,
-        density=_densities(path, _cells(shapes), frames, rest),
+        density=factor(path.scale, "force") * _densities(path, _cells(shapes), frames, rest),
         section=_section(path, x[0]),
         classes=() if softest is None else softest.classes,
         eigenvalues=spread(values, position),
         u=None if softest is None else spread(softest.u, position),
+        scale=path.scale,
     )
 
 

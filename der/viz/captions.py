@@ -5,26 +5,34 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from der.geometry.scale import Scale
 from der.records.path import Path, Point
+from der.records.units import unit
 from der.viz.animation import Motion
 from der.viz.palette import POINTS
 from der.viz.titles import names, plain
 
 STAYS = 0.12  # share of the steps during which a caption names a special point
 SHOWN = """\
-Colour: energy of bending (left) and of twisting (right) per length, from 0 to {top:.4g} GJ/a².
+Colour: energy of bending (left) and of twisting (right) per length, from 0 to {top:.4g} {unit}.
 
 Black arrows: rotations of the grips. Vermilion arrows: the moment on each grip, along the \
 twisting axis. Green: the path of the free points."""
 
 
-def event_text(point: Point) -> str:
+def density_unit(scale: Scale | None) -> str:
+    """The unit of energy per length."""
+    return "GJ/a²" if scale is None else unit(scale, "force")
+
+
+def event_text(point: Point, scale: Scale | None) -> str:
     """A special point as a line of the log."""
     line = f"{POINTS[point.kind]}, gamma {point.gamma:.8g} ({point.gamma / math.pi:.4g} π)"
     if point.index_before is not None or point.index_after is not None:
         before, after = ("?" if i is None else i for i in (point.index_before, point.index_after))
         line += f", index {before}" if before == after else f", index {before} -> {after}"
-    line += f", M {point.moment:.6g} GJ/a, U {point.energy:.6g} GJ/a"
+    line += f", M {point.moment:.6g} {unit(scale, 'moment')}"
+    line += f", U {point.energy:.6g} {unit(scale, 'energy')}"
     for name, value in point.details.items():
         line += f", {plain(name)} {f'{value:.6g}' if isinstance(value, float) else value}"
     return line
@@ -73,11 +81,12 @@ def captions(path: Path, motion: Motion) -> list[Caption]:
 
 def _numbers(motion: Motion, step: int) -> str:
     """Gamma, M and U of a step."""
-    moment = motion.moment[step]
+    moment, scale = motion.moment[step], motion.scale
+    shown = _digits if scale is None else "{:.4g}".format
     parts = [
         f"γ = {_digits(motion.gamma[step] / math.pi)} π",
-        "" if math.isnan(moment) else f"M = {_digits(moment)} GJ/a",
-        f"U = {_digits(motion.energy[step])} GJ/a",
+        "" if math.isnan(moment) else f"M = {shown(moment)} {unit(scale, 'moment')}",
+        f"U = {shown(motion.energy[step])} {unit(scale, 'energy')}",
     ]
     return "   ".join(filter(None, parts))
 
@@ -115,7 +124,7 @@ def about(path: Path, motion: Motion) -> str:
     parts = [
         f"# {names([path])[0]}",
         f"The section is drawn {scale}: h = {h:.4g} a, t = {t:.4g} a.",
-        SHOWN.format(top=motion.top),
+        SHOWN.format(top=motion.top, unit=density_unit(motion.scale)),
     ]
     if motion.u is not None:
         parts.append("Thin vermilion line: the softest mode, its size exaggerated.")

@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from der.records.path import Path
+from der.records.units import head
 from der.utils.checks import Array
 from der.utils.files import FilePath
 from der.viz.animation import Motion, grips
-from der.viz.captions import about, captions
+from der.viz.captions import about, captions, density_unit
 from der.viz.curve import stretches
 from der.viz.files import checked_suffix, write
 from der.viz.palette import INK, PAIR, PALE, POINTS, QUIET, STRETCHES
@@ -56,7 +57,6 @@ MESH = {  # the look of the ribbon
     "lightposition": {"x": 3000, "y": -1500, "z": 4000},
 }
 BAR = {  # the look of the colour bar
-    "title": {"text": "energy per length, GJ/a²", "side": "right", "font": {"size": 11}},
     "thickness": 9,
     "len": 0.55,
     "outlinewidth": 0,
@@ -183,7 +183,9 @@ def _mesh(motion: Motion, k: int, top: float, *, two: bool) -> dict[str, Any]:
     place = {"x": 0.487, "xanchor": "center", "y": 0.72} if two else {"x": 0.0, "xanchor": "left"}
     faces = dict(zip("ijk", triangles(n_v).T.tolist(), strict=True))
     vertices = dict.fromkeys(("x", "y", "z", "intensity"), [0.0] * (8 * n_v))
-    bar = {"cmax": top, "showscale": k == 0, "colorbar": BAR | place}
+    text = f"energy per length, {density_unit(motion.scale)}"
+    title = {"text": text, "side": "right", "font": {"size": 11}}
+    bar = {"cmax": top, "showscale": k == 0, "colorbar": BAR | place | {"title": title}}
     return MESH | faces | vertices | bar | {"scene": _SCENES[k]}
 
 
@@ -259,13 +261,18 @@ def _layout(paths: Sequence[Path], motions: Sequence[Motion]) -> dict[str, Any]:
     places = [{"domain": {"x": x, "y": y}} for x, y in views]
     scenes = {name: scene | place for name, place in zip(_SCENES, places, strict=False)}
     turned, turns = "rotation of a grip, γ/π", [v / math.pi for v in _range(paths, "gamma")]
+    scale = paths[0].scale
     moments, energies = _range(paths, "moment"), _range(paths, "energy")
     return {
         **scenes,
         "xaxis": _axis(turned, domain=mx, anchor="y", range=turns),
-        "yaxis": _axis("moment M a/GJ", domain=my, anchor="x", range=moments),
+        "yaxis": _axis(
+            "moment " + head(scale, "M", "moment"), domain=my, anchor="x", range=moments
+        ),
         "xaxis2": _axis(turned, domain=ux, anchor="y2", matches="x"),
-        "yaxis2": _axis("energy U a/GJ", domain=uy, anchor="x2", range=energies),
+        "yaxis2": _axis(
+            "energy " + head(scale, "U", "energy"), domain=uy, anchor="x2", range=energies
+        ),
     } | LOOK
 
 

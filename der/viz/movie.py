@@ -26,6 +26,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
+from der.geometry.scale import Scale
 from der.records.path import Path
 from der.utils.checks import Array
 from der.utils.files import FilePath
@@ -212,7 +213,7 @@ class MovieFigure:
         limits = np.stack([reach[:, 0].min(axis=0), reach[:, 1].max(axis=0)])
         for ring, row in zip(self.rings, rows, strict=True):
             ring.place(row, limits)
-        _label(curves, beside=two)
+        _label(curves, paths[0].scale, beside=two)
         self._legend(paths, called, two=two)
         for ring in self.rings:
             for artist in ring.show(0):
@@ -267,9 +268,9 @@ def _draw(axes: Axes, path: Path, height: Array, colour: str | None) -> None:
     axes.plot(path.gamma[at] / math.pi, height[at], zorder=3, **look)
 
 
-def _label(curves: Sequence[Axes], *, beside: bool) -> None:
+def _label(curves: Sequence[Axes], scale: Scale | None, *, beside: bool) -> None:
     """Labels and ticks of the axes of M and U."""
-    for axes, label in zip(curves, (style.MOMENT, style.ENERGY), strict=True):
+    for axes, label in zip(curves, (style.moment(scale), style.energy(scale)), strict=True):
         style.label_axes(axes, style.GAMMA, label, fontsize=8.5)
         axes.margins(x=0.03, y=0.1)
         axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))

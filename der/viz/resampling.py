@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from der.records.path import Path
+from der.records.units import in_units
 from der.utils.checks import Array
 from der.viz.animation import Motion, animate
 from der.viz.curve import chord_length, pieces, smooth, spline
@@ -32,7 +33,7 @@ def resampled(path: Path, n: int) -> Motion:
 
 
 def one_or_two(path: Path | Sequence[Path]) -> list[Path]:
-    """One path or two as a list.
+    """One path or two as a list, with their numbers in their units where these are the same.
 
     Raises
     ------
@@ -42,7 +43,9 @@ def one_or_two(path: Path | Sequence[Path]) -> list[Path]:
     paths = [path] if isinstance(path, Path) else list(path)
     if len(paths) not in (1, 2):
         raise ValueError(f"path must be one or two, got {len(paths)}")
-    return paths
+    if len({None if one.scale is None else one.scale.units for one in paths}) > 1:
+        return [replace(one, scale=None) for one in paths]
+    return list(map(in_units, paths))
 
 
 def in_step(paths: Sequence[Path], n: int) -> list[Motion]:

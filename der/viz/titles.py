@@ -22,6 +22,9 @@ def title(record: Any, *more: str, mesh: bool = True) -> str:
     mesh : whether the mesh is named.
     """
     parts = [ring_text(record.ring), section_text(getattr(record, "section", {}))]
+    if record.scale is not None:
+        length, name = record.scale.unit("length")
+        parts.append(f"a = {length:.6g} {name}")
     if mesh:
         parts.append(mesh_text(record.numerics))
     return BETWEEN.join(part for part in (*parts, *more) if part)

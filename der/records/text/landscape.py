@@ -78,8 +78,9 @@ def _pass(found: Pass) -> list[str]:
     told = barriers_text(found, found.barriers, " of the free ring")
     saddle = found.saddle
     if saddle is not None:
+        energy = f"{saddle.energy:.8g} {unit(found.scale, 'energy')}"
         told.append(
-            f"saddle: U = {saddle.energy:.8g} {unit(found.scale, 'energy')}, index {count(saddle.index)}, "
+            f"saddle: U = {energy}, index {count(saddle.index)}, "
             f"residual {saddle.residual:.1e}, between {' and '.join(saddle.ends)}"
             + (", that of twisting" if saddle.twisted else "")
         )

@@ -26,7 +26,10 @@ def draw(comparison: Comparison) -> Figure:
     figure = style.blank(8.0, 7.0, title(rod, f"{bvp.numerics['intervals']} intervals"))
     sides = {"left": 0.1, "right": 0.985, "bottom": 0.125, "top": 0.935}
     grid = figure.subplots(2, 2, gridspec_kw=sides | {"wspace": 0.27, "hspace": 0.23})
-    names = (("moment", style.MOMENT, "distance in the scaled plane"), ("energy", style.ENERGY, ""))
+    names = (
+        ("moment", style.moment(rod.scale, "moment of one arm"), "distance in the scaled plane"),
+        ("energy", style.energy(rod.scale), ""),
+    )
     handles: dict[str, Any] = {}
     for (above, below), (name, label, distance) in zip(grid.T, names, strict=True):
         _draw_curves(above, rod, bvp, name)

@@ -43,12 +43,14 @@ def draw(surface: Surface) -> Figure:
     axes = figure.add_axes((0.06, 0.175, 0.42, 0.74))
     filled = _contours(axes, surface, norm)
     handles = [*_hatches(axes, surface), *_overlay(axes, surface)]
-    style.label_axes(axes, style.GAMMA, "distance of the grips  $d/a$")
+    style.label_axes(
+        axes, style.GAMMA, style.quantity(surface.scale, "distance of the grips", "d", "length")
+    )
     axes.set_xlim(surface.gamma[0] / math.pi, surface.gamma[-1] / math.pi)
     axes.set_ylim(float(surface.distance[0]), float(surface.distance[-1]))
     bar = figure.colorbar(filled, cax=figure.add_axes((0.492, 0.175, 0.011, 0.74)))
     ticks = MaxNLocator(7).tick_values(0.0, 0.97 * ceiling)[:-1]
-    style.dress_bar(bar, "least energy  $U\\,a/GJ$", ticks, 8.5)
+    style.dress_bar(bar, style.quantity(surface.scale, "least energy", "U", "energy"), ticks, 8.5)
     _relief(figure, surface, norm)
     style.legend_below(figure, handles)
     return figure
@@ -121,7 +123,9 @@ def _relief(figure: Figure, surface: Surface, norm: PowerNorm) -> None:
     axes.view_init(elev=27.0, azim=-128.0)
     axes.zaxis.set_rotate_label(False)
     axes.set_box_aspect((1.25, 1.0, 0.8), zoom=0.95)
-    labels = {"x": "$\\gamma/\\pi$", "y": "$d/a$", "z": "$U\\,a/GJ$"}
+    length = style.quantity(surface.scale, "", "d", "length").strip()
+    height_label = style.quantity(surface.scale, "", "U", "energy").strip()
+    labels = {"x": "$\\gamma/\\pi$", "y": length, "z": height_label}
     for name, label in labels.items():
         axis = getattr(axes, f"{name}axis")
         axis.set_label_text(label, fontsize=8.5, color=INK)

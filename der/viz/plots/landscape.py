@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from der.records.landscape import Landscape, Rest
+from der.records.units import unit
 from der.utils.checks import Array
 from der.viz.palette import INK, QUIET
 from der.viz.plots import style
@@ -34,8 +35,8 @@ def draw(landscape: Landscape) -> Figure:
     ratio = 0.4925 / 0.2325
     above, below = style.stacked(figure, ratio, left=left, right=right, bottom=0.165, top=0.915)
     curves = (
-        (above, path.energy, "", style.ENERGY),
-        (below, path.moment, style.GAMMA, style.MOMENT),
+        (above, path.energy, "", style.energy(path.scale)),
+        (below, path.moment, style.GAMMA, style.moment(path.scale)),
     )
     for axes, height, across, up in curves:
         _draw_curve(axes, landscape, height)
@@ -71,7 +72,7 @@ def _fold_barrier(axes: Axes, landscape: Landscape) -> None:
         return
     saddle, flat = landscape.rests[found.saddle], landscape.rests[0]
     _barrier(axes, 0.05, flat, saddle, (0.0, saddle.gamma / math.pi))
-    text = _height("fold", found.fold, landscape.extrapolated)
+    text = _height("fold", found.fold, landscape)
     style.annotate(axes, (0.05, flat.energy + 0.74 * found.fold), text, (7.0, 0.0))
 
 
@@ -88,7 +89,7 @@ def _saddle_and_well(axes: Axes, landscape: Landscape) -> None:
     axes.set_xlim(saddle.gamma / math.pi - 0.75 * span, end.gamma / math.pi + room * span)
     axes.set_ylim(end.energy - 0.7 * found.open, saddle.energy + 0.45 * found.open)
     _barrier(axes, x, end, saddle, (saddle.gamma / math.pi, x))
-    text = _height("open", found.open, landscape.extrapolated)
+    text = _height("open", found.open, landscape)
     style.annotate(axes, (x, 0.5 * (end.energy + saddle.energy)), text, (6.0, 0.0))
     for rest, name, away in ((saddle, "saddle", 11.0), (end, "folded", -16.0)):
         index = "?" if rest.index_free is None else rest.index_free
@@ -96,16 +97,17 @@ def _saddle_and_well(axes: Axes, landscape: Landscape) -> None:
         text = f"{name}\n$\\gamma$ = {gamma:.4f} $\\pi$\nindex without grips: {index}"
         look = {"ha": "center", "va": side, "fontsize": 7.5}
         style.annotate(axes, (gamma, rest.energy), text, (0.0, away), **look)
-    style.label_axes(axes, "$\\gamma/\\pi$", style.ENERGY, ticks=(5, 0))
+    style.label_axes(axes, "$\\gamma/\\pi$", style.energy(path.scale), ticks=(5, 0))
     axes.ticklabel_format(useOffset=False)
 
 
-def _height(name: str, mesh: float, known: Mapping[str, tuple[float, float]]) -> str:
+def _height(name: str, mesh: float, landscape: Landscape) -> str:
     """A barrier as text; where it is extrapolated, the value of the mesh follows."""
+    known, energy = landscape.extrapolated, unit(landscape.scale, "energy")
     if name not in known:
-        return f"to {name}\n{mesh:.4g} GJ/a"
+        return f"to {name}\n{mesh:.4g} {energy}"
     value, _, error = sure(*known[name]).partition(" ")
-    return f"to {name}\n{value}\n{error} GJ/a\nextrapolated\n(mesh {mesh:.5g})"
+    return f"to {name}\n{value}\n{error} {energy}\nextrapolated\n(mesh {mesh:.5g})"
 
 
 def _barrier(axes: Axes, x: float, low: Rest, high: Rest, across: Iterable[float]) -> None:

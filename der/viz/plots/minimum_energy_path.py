@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from der.records.landscape import Pass, Saddle
+from der.records.units import unit
 from der.viz.palette import INK, QUIET, STABLE
 from der.viz.plots import style
 from der.viz.plots.rings import seen
@@ -40,7 +41,9 @@ def draw(found: Pass) -> Figure:
     axes.plot(progress, energy, zorder=2, **LINE)
     for k, look in ((0, WELL), (top, SADDLE), (len(energy) - 1, WELL)):
         axes.plot(progress[k], energy[k], zorder=5, clip_on=False, **look)
-    style.label_axes(axes, "distance along the path  [rad, root mean square]", style.ENERGY)
+    style.label_axes(
+        axes, "distance along the path  [rad, root mean square]", style.energy(found.scale)
+    )
     place: dict[str, Any] = {"ha": "left", "va": "top", "fontsize": 8, "transform": axes.transAxes}
     style.place_text(axes, (0.03, 0.975), "\n".join(_barriers(found, found.saddle)), **place)
     _enlarge(axes, found, float(progress[top]))
@@ -56,14 +59,15 @@ def _barriers(found: Pass, saddle: Saddle) -> list[str]:
     """Barriers of the free ring, and of twisting in grips, as lines of text."""
     kind = "the saddle of twisting" if saddle.twisted else "another saddle than that of twisting"
     lines = [f"{kind}, index {'?' if saddle.index is None else saddle.index}"]
+    energy = unit(found.scale, "energy")
     for name in ("fold", "open"):
         value, twisting = getattr(found, name), getattr(found.twisting, name)
-        text, mesh = f"{value:.5g} GJ/a", ""
+        text, mesh = f"{value:.5g} {energy}", ""
         if name in found.extrapolated:
-            text = f"{sure(*found.extrapolated[name])} GJ/a, extrapolated (mesh {value:.5g})"
+            text = f"{sure(*found.extrapolated[name])} {energy}, extrapolated (mesh {value:.5g})"
             mesh = " (mesh)"
         lines.append(f"to {name}: {text}")
-        other = "no barrier" if twisting is None else f"{twisting:.5g} GJ/a{mesh}"
+        other = "no barrier" if twisting is None else f"{twisting:.5g} {energy}{mesh}"
         lines.append(f"      in clamped grips, by twisting: {other}")
     return lines
 

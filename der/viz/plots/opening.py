@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from der.records.opening import ALIKE, EVENTS, KINDS, LeastPush, Push
+from der.records.units import unit
 from der.utils.checks import Array
 from der.viz.palette import DASHES, FREE, INK, STABLE, UNSTABLE
 from der.viz.plots import style
@@ -20,10 +21,6 @@ from der.viz.ribbon import projected
 from der.viz.titles import sure, title
 
 COLOURS = {"force": STABLE, "couple": UNSTABLE}
-AXES = {
-    "force": ("change of distance  $\\Delta D/a$", "force  $P\\,a^2/GJ$"),
-    "couple": ("angle  $\\theta$  [rad]", "couple  $C\\,a/GJ$"),
-}
 MOST = 7  # loads of each kind whose work is shown
 SHAPES = ("force", "couple", "force dead", "couple dead")
 SYMBOLS = {"pass": "^", "fold": "D", "branch": "s", "limit": "v", "end": "X"}
@@ -67,13 +64,13 @@ def _entries(found: LeastPush, ranked: Mapping[str, list[Push]]) -> list[Any]:
     best = [found.pushes[k].held for k in found.least.values()]
     dead = [found.pushes[k].dead for k in found.least_dead.values()]
     events = {instant.event for instant in (*best, *dead) if instant is not None}
-    mesh = " (mesh)" if found.extrapolated else ""
+    mesh, energy = " (mesh)" if found.extrapolated else "", unit(found.scale, "energy")
     entries: list[tuple[object, str, dict[str, Any]]] = [
         (True, "others that open the ring", OTHERS),
         (any(_dashed(found, kind) for kind in ranked), "the best dead load", BEST_DEAD),
         (
             found.barrier,
-            f"barrier of the free ring, {found.barrier or 0.0:.4g} GJ/a{mesh}",
+            f"barrier of the free ring, {found.barrier or 0.0:.4g} {energy}{mesh}",
             {"color": FREE, "linewidth": 1.5},
         ),
         *((name in events, text, MARKS[name]) for name, text in EVENTS.items()),
@@ -139,10 +136,11 @@ def _caption(found: LeastPush, push: Push, name: str) -> str:
     """The load, its points, the event at its end, and the work, extrapolated where known."""
     dead = name.endswith("dead")
     instant = push.dead if dead and push.dead is not None else push.held
-    work = f"work {instant.work:.4g} GJ/a{' (mesh)' if found.extrapolated else ''}"
+    energy = unit(found.scale, "energy")
+    work = f"work {instant.work:.4g} {energy}{' (mesh)' if found.extrapolated else ''}"
     if name in found.extrapolated:
         value = sure(*found.extrapolated[name])
-        work = f"work {value} GJ/a\nextrapolated (mesh {instant.work:.4g})"
+        work = f"work {value} {energy}\nextrapolated (mesh {instant.work:.4g})"
     first = f"{'dead' if dead else 'quasi-static'} {push.kind}, {push.direction}"
     return "\n".join([first, _points(push), EVENTS[instant.event], work])
 
@@ -172,8 +170,17 @@ def _draw_curves(axes: Axes, found: LeastPush, kind: str) -> None:
     shown = [best] if at_limit is None else [best, at_limit]
     axes.set_ylim(0.0, 2.2 * max(one.peak for one in shown))
     axes.set_xlim(0.0, 1.7 * max(one.held.push for one in shown))
-    style.label_axes(axes, *AXES[kind], ticks=(6, 5))
+    style.label_axes(axes, *_labels(found, kind), ticks=(6, 5))
     axes.xaxis.labelpad = 2
+
+
+def _labels(found: LeastPush, kind: str) -> tuple[str, str]:
+    """Labels of the axes of displacement and load."""
+    if kind == "couple":
+        couple = style.quantity(found.scale, "couple", "C", "moment")
+        return "angle  $\\theta$  [rad]", couple
+    distance = style.quantity(found.scale, "change of distance", "\\Delta D", "length")
+    return distance, style.quantity(found.scale, "force", "P", "force")
 
 
 def _dashed(found: LeastPush, kind: str) -> bool:
@@ -213,7 +220,12 @@ def _draw_works(axes: Axes, found: LeastPush, ranked: Mapping[str, list[Push]]) 
         axes.axvline(found.barrier, color=FREE, linewidth=1.5, zorder=3)
     widest = max(one.held.work for one in rows)
     axes.set_xlim(0.0, 1.05 * min(widest, 2.0 * (found.barrier or math.inf)))
-    style.label_axes(axes, "work until the ring opens  $W\\,a/GJ$", "", ticks=(5, 0))
+    style.label_axes(
+        axes,
+        style.quantity(found.scale, "work until the ring opens", "W", "energy"),
+        "",
+        ticks=(5, 0),
+    )
     axes.set_yticks(place, [f"{_points(one)}  {one.direction}" for one in rows])
     axes.tick_params(axis="y", length=0, labelsize=7)
     axes.spines["left"].set_visible(False)

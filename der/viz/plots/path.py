@@ -24,6 +24,7 @@ from der.viz.titles import times_pi, title
 STATE: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.2, "color": INK}
 MANY = 250  # states; more would hide the line below them
 LETTERS = "ABCDEF"  # one for each snapshot
+ONE_GRIP = "$M$: one arm; a torque cell on a grip reads $2M$"
 CAPTION = 0.82  # room for the text below a ribbon, over the row's height
 
 
@@ -46,8 +47,8 @@ def draw(path: Path) -> Figure:
     for axes, height in curves:
         _draw_curve(axes, path, height)
         axes.yaxis.set_label_coords(-0.062, 0.5)
-    style.label_axes(above, "", style.MOMENT)
-    style.label_axes(below, style.GAMMA, style.ENERGY)
+    style.label_axes(above, "", style.moment(path.scale, "moment of one arm"))
+    style.label_axes(below, style.GAMMA, style.energy(path.scale))
     style.zero_line(above)
     below.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 2.5, 5, 10]))
     if path.shapes is not None:
@@ -57,6 +58,7 @@ def draw(path: Path) -> Figure:
         for axes, height in curves:
             places = np.column_stack([path.gamma / math.pi, height])[chosen]
             style.place_letters(axes, LETTERS, places, smooth(path, height))
+    figure.text(0.985, 0.079, ONE_GRIP, ha="right", va="center", fontsize=7.5, color=INK)
     style.legend_below(figure, _entries(path), fontsize=7.5)
     return figure
 

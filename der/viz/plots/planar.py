@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from der.records.planar import FOLDED, PlanarState, PlanarStates
+from der.records.units import factor, unit
 from der.utils.checks import Array
 from der.viz.palette import STABLE, UNSTABLE
 from der.viz.plots import style
@@ -50,7 +51,7 @@ def draw(found: PlanarStates) -> Figure:
         if shapes:
             half = 0.54 * max(extents[k], max(extents) / LARGER)
             draw_closed(axes, shapes[k], _colour(state), half)
-        _caption(axes, state)
+        _caption(axes, state, found)
     occurring = {state.stable for state in found.states}
     handles = [
         style.entry(text, color=c, linewidth=1.8)
@@ -61,14 +62,16 @@ def draw(found: PlanarStates) -> Figure:
     return figure
 
 
-def _caption(axes: Axes, state: PlanarState) -> None:
+def _caption(axes: Axes, state: PlanarState, found: PlanarStates) -> None:
     """Name, energy and index below a shape."""
     name = "\n".join(textwrap.wrap(state.name, 18))
     look: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
     style.place_text(axes, (0.5, -0.02), name, fontsize=8.0, linespacing=1.15, **look)
     kind = "stable" if state.stable else f"index {'?' if state.index is None else state.index}"
-    energy = state.energy if abs(state.energy) > _ZERO else 0.0
-    lines = f"$U\\,a/GJ$ = {energy:.5g}, {kind}"
+    energy = state.energy if abs(state.energy) > _ZERO * factor(found.scale, "energy") else 0.0
+    height = "$U\\,a/GJ$" if found.scale is None else "$U$"
+    unit_name = "" if found.scale is None else f" {unit(found.scale, 'energy')}"
+    lines = f"{height} = {energy:.5g}{unit_name}, {kind}"
     if state.turning == FOLDED and state.packing is not None:
         lines += f"\npacking {state.packing:.4f}"
     low = -0.28 if "\n" in name else -0.16

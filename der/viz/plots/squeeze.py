@@ -38,8 +38,11 @@ def draw(found: Squeeze) -> Figure:
     chosen = _chosen(found)
     if found.shapes is not None:
         _draw_shapes(figure, found, found.shapes.x[chosen][:, :, 1:], chosen)
-    force = "force  $F\\,a^2/GJ$"
-    for left, values, label in ((0.095, found.force, force), (0.59, found.energy, style.ENERGY)):
+    force = style.quantity(found.scale, "force", "F", "force")
+    for left, values, label in (
+        (0.095, found.force, force),
+        (0.59, found.energy, style.energy(found.scale)),
+    ):
         axes = figure.add_axes((left, 0.13, 0.385, 0.45))
         _draw_values(axes, found, values, label)
         places = np.column_stack([found.distance, values])
@@ -64,12 +67,13 @@ def _draw_shapes(figure: Figure, found: Squeeze, x: Array, chosen: list[int]) ->
     """Draw shapes x (k, N, 2) in one scale, with the two points."""
     half = 0.55 * float(np.ptp(x, axis=1).max())
     share = 0.94 / len(chosen)
+    distance = "$d/a$" if found.scale is None else "$d$"
     for k, (at, one) in enumerate(zip(chosen, x, strict=True)):
         axes = figure.add_axes((0.03 + share * k, 0.63, share, 0.3))
         draw_closed(axes, closed_curve(one), LINE[found.index[at] == 0]["color"], half)
         spots = 0.5 * (one + np.roll(one, 1, axis=0))[[0, len(one) // 2]]
         axes.plot(*spots.T, "o", color=INK, markersize=4.0, zorder=4)
-        text = rf"$\bf{{{LETTERS[k]}}}$   $d/a$ = {found.distance[at]:.3g}"
+        text = rf"$\bf{{{LETTERS[k]}}}$   {distance} = {found.distance[at]:.3g}"
         look = {"va": "top", "fontsize": 8, "transform": axes.transAxes}
         style.place_text(axes, (0.5, -0.02), text, **look)
 
@@ -84,4 +88,9 @@ def _draw_values(axes: Axes, found: Squeeze, values: Array, label: str) -> None:
     for point in found.points:
         value = point.force if values is found.force else point.energy
         axes.plot(point.distance, value, zorder=5, **style.mark(*style.MARKS[point.kind]))
-    style.label_axes(axes, "distance of the points  $d/a$", label, ticks=(6, 6))
+    style.label_axes(
+        axes,
+        style.quantity(found.scale, "distance of the points", "d", "length"),
+        label,
+        ticks=(6, 6),
+    )

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from der.records.states import RingState, States
+from der.records.units import factor, unit
 from der.utils.checks import Array
 from der.viz.palette import INK, STABLE, UNSTABLE
 from der.viz.plots import style
@@ -59,7 +60,7 @@ def draw(found: States) -> Figure:
     row.set_ylim(0.0, 0.3 * HEIGHT / wide)
     row.set_axis_off()
     for i, state in enumerate(shown):
-        _caption(row, i, state, wide)
+        _caption(row, i, state, wide, _ZERO * factor(found.scale, "energy"))
     if found.shapes is not None:
         _draw_ribbons(row, found, shown, wide)
     _draw_graph(graph, found, shown)
@@ -70,11 +71,11 @@ def draw(found: States) -> Figure:
 # --- Shapes ----------------------------------------------------------------------------------
 
 
-def _caption(row: Axes, i: int, state: RingState, wide: float) -> None:
-    """Name, energy and index of a state."""
+def _caption(row: Axes, i: int, state: RingState, wide: float, zero: float) -> None:
+    """Name, energy and index of a state; energies up to ``zero`` are rounding."""
     name = "\n".join(textwrap.wrap(state.name, max(13, int(13 * wide))))
     style.place_text(row, (i, 0.47 / wide), name, fontsize=7.8, linespacing=1.1)
-    energy = state.energy if abs(state.energy) > _ZERO else 0.0
+    energy = state.energy if abs(state.energy) > zero else 0.0
     kind = "stable" if state.stable else f"index {'?' if state.index is None else state.index}"
     look = {"fontsize": 7.0, "linespacing": 1.1, "color": _colour(state)}
     style.place_text(row, (i, 0.13 / wide), f"$U$ = {energy:.4g}\n{kind}", **look)
@@ -119,13 +120,13 @@ def _draw_graph(axes: Axes, found: States, shown: tuple[RingState, ...]) -> None
     low, high = float(energy.min()), float(energy.max())
     if high - low < 0.05 * abs(high):  # one level: how far it lies above a ring without strain
         low, high = min(low, 0.0), max(high, 0.0)
-    span = (high - low) if high - low > _ZERO else 1.0
+    span = (high - low) if high - low > _ZERO * factor(found.scale, "energy") else 1.0
     axes.set_ylim(low - 0.09 * span, low + 1.08 * span)
     axes.vlines(range(len(shown)), energy, axes.get_ylim()[1], color="#ececec", lw=0.7, zorder=0)
     _draw_arrows(axes, found, {state.name: (i, state.energy) for i, state in enumerate(shown)})
     for i, state in enumerate(shown):
         _draw_node(axes, i, state)
-    style.label_axes(axes, "", style.ENERGY, ticks=(0, 7))
+    style.label_axes(axes, "", style.energy(found.scale), ticks=(0, 7))
     axes.set_xticks([])
     axes.spines["bottom"].set_visible(False)
 
@@ -200,7 +201,7 @@ def _entries(found: States, shown: tuple[RingState, ...]) -> list[Any]:
         (found.gamma is not None and found.shapes is not None, "grip", GRIP),
         (
             any(one.end is not None for one in found.transitions),
-            "relaxes to, energy released  [GJ/a]",
+            f"relaxes to, energy released  [{unit(found.scale, 'energy')}]",
             arrow,
         ),
     ]

@@ -18,7 +18,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
+from der.geometry.scale import Scale
 from der.records.path import Path
+from der.records.units import unit
 from der.utils.checks import Array
 from der.utils.files import FilePath
 from der.viz.curve import stretches
@@ -28,7 +30,7 @@ from der.viz.palette import INK, QUIET, STRETCHES
 FORMATS = (".png", ".pdf", ".svg")
 DPI = 150
 GAMMA = "rotation of a grip  $\\gamma/\\pi$"
-MOMENT, ENERGY = "moment  $M\\,a/GJ$", "energy  $U\\,a/GJ$"
+PLAIN = {"moment": "\\,a/GJ", "energy": "\\,a/GJ", "force": "\\,a^2/GJ", "length": "/a"}
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 MARKS = {  # marker and size of special points, by their kind
     "fold": ("D", 4.6),
@@ -77,6 +79,23 @@ def stacked(figure: Figure, ratio: float, **grid: float) -> tuple[Axes, Axes]:
     below = figure.add_subplot(places[1], sharex=above)
     above.tick_params(labelbottom=False)
     return above, below
+
+
+def quantity(scale: Scale | None, words: str, symbol: str, kind: str) -> str:
+    """The label of an axis: "energy  U a/GJ", or "energy  U  [N mm]"."""
+    if scale is None:
+        return f"{words}  ${symbol}{PLAIN[kind]}$"
+    return f"{words}  ${symbol}$  [{unit(scale, kind)}]"
+
+
+def moment(scale: Scale | None, words: str = "moment") -> str:
+    """The label of an axis of M."""
+    return quantity(scale, words, "M", "moment")
+
+
+def energy(scale: Scale | None) -> str:
+    """The label of an axis of U."""
+    return quantity(scale, "energy", "U", "energy")
 
 
 def label_axes(

@@ -16,11 +16,13 @@ from rerun.blueprint.encodings import (
     VisualizerComponentMapping,
 )
 
+from der.geometry.scale import Scale
+from der.records.units import head
 from der.viz.animation import ENERGIES, Motion
 from der.viz.rerun.axes import HIGH, WIDE
 
 UNDER = ("first", "second")  # entities of two motions beside each other
-CURVES = {"moment": "M a/GJ over gamma", "energy": "U a/GJ over gamma"}
+CURVES = {"moment": "M", "energy": "U"}
 ROOTS = ("", *(f"/{under}" for under in UNDER))
 SERIES = {  # entities by the title of their view
     "M and gamma": ["/series/moment", "/series/gamma"],
@@ -39,11 +41,18 @@ def while_solving() -> rrb.Blueprint:
     return rrb.Blueprint(_space(SOLVING, "solving"), panel, *_aside())
 
 
+def _titles(scale: Scale | None) -> dict[str, str]:
+    """Titles of the views of curves, by what they show."""
+    return {name: f"{head(scale, symbol, name)} over gamma" for name, symbol in CURVES.items()}
+
+
 def layout(motion: Motion) -> rrb.Blueprint:
     """The ring on the left, once for each energy; curves, series and texts on the right."""
     n = len(motion.x)
     bounds = (-20, WIDE + 8, -HIGH - 8, 14)
-    curves = [_plane(f"curves/{name}", title, bounds) for name, title in CURVES.items()]
+    curves = [
+        _plane(f"curves/{name}", title, bounds) for name, title in _titles(motion.scale).items()
+    ]
     series = [_series_view(n, *one) for one in SERIES.items()]
     parts = (rrb.Horizontal(*curves), rrb.Horizontal(*series), _states(n), _log_and_about())
     right = rrb.Vertical(*parts, row_shares=[4, 3, 1.7, 3])
@@ -60,7 +69,8 @@ def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
     ]
     bounds = (-20, WIDE + 8, -HIGH - 18, 14)
     entities = {name: [f"{under}/curves/{name}/**" for under in ROOTS] for name in CURVES}
-    curves = [_plane("/", title, bounds, contents=entities[name]) for name, title in CURVES.items()]
+    titles = _titles(motions[0].scale)
+    curves = [_plane("/", title, bounds, contents=entities[name]) for name, title in titles.items()]
     series = [
         _series_view(n, f"{name} over steps", [f"/{under}/series/{name}" for under in UNDER])
         for name in ("gamma", "index")
@@ -75,7 +85,8 @@ def beside(motions: Sequence[Motion], called: Sequence[str]) -> rrb.Blueprint:
 def landscape_layout(motion: Motion, *, well: bool, surface: bool) -> rrb.Blueprint:
     """The ring on the left; on the right the landscape, in one dimension or in both."""
     n = len(motion.x)
-    title, bounds = "energy landscape, U a/GJ over gamma", (-24, WIDE + 26, -HIGH - 10, 14)
+    title = f"energy landscape, {_titles(motion.scale)['energy']}"
+    bounds = (-24, WIDE + 26, -HIGH - 10, 14)
     curves: Any = _plane("landscape/whole", title, bounds)
     if well:
         bounds = (-26, WIDE + 14, -HIGH - 10, 14)

@@ -11,9 +11,10 @@ import numpy as np
 import rerun as rr
 
 from der.records.path import Path
+from der.records.units import head
 from der.utils.checks import Array
 from der.viz.animation import spread
-from der.viz.captions import event_text
+from der.viz.captions import density_unit, event_text
 from der.viz.curve import SNAP, stretches
 from der.viz.palette import POINTS
 from der.viz.rerun.axes import PlotAxes, dotted, send_axes, send_labels
@@ -48,7 +49,7 @@ def send_key(sent: Entities) -> None:
     bars = [[[300 * a, 0], [300 * b, 0]] for a, b in pairwise(share)]
     shades = viridis(0.5 * (share[1:] + share[:-1]))
     sent.still("key/bar", rr.LineStrips2D(bars, colors=shades, radii=5.0))
-    ends = ["0", "energy density, GJ/a²", f"{sent.top:.3g}"]
+    ends = ["0", f"energy density, {density_unit(sent.motion.scale)}", f"{sent.top:.3g}"]
     send_labels(sent, "key/values", [[0, 14], [150, 14], [300, 14]], ends)
 
 
@@ -125,9 +126,9 @@ def send_series(
     motion = sent.motion
     index = spread(np.ma.filled(path.index.astype(float), np.nan), motion.position)
     series = {
-        "moment": (motion.moment, "M a/GJ", SKY),
+        "moment": (motion.moment, head(motion.scale, "M", "moment"), SKY),
         "gamma": (motion.gamma, "gamma, rad", QUIET),
-        "energy": (motion.energy, "U a/GJ", ORANGE),
+        "energy": (motion.energy, head(motion.scale, "U", "energy"), ORANGE),
         "index": (index, "index", VERMILION),
     }
     for k, (label, column) in enumerate(zip(motion.classes, motion.eigenvalues.T, strict=True)):
@@ -161,7 +162,7 @@ def send_events(sent: Entities, path: Path, *, name: str = "") -> None:
     steps = [motion.step_of(point.position) for point in path.points]
     before = f"{name}: " if name else ""
     if steps:
-        texts = [before + event_text(point) for point in path.points]
+        texts = [before + event_text(point, path.scale) for point in path.points]
         sent.run("events", rr.TextLog.columns(text=texts), steps)
     kinds = [POINTS[point.kind] for point in path.points]
     names = {

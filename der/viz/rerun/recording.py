@@ -18,6 +18,7 @@ import rerun as rr
 from der.records.energy_surface import Surface
 from der.records.landscape import Landscape
 from der.records.path import Path
+from der.records.units import in_units
 from der.utils.checks import Array
 from der.utils.files import FilePath
 from der.viz.animation import Motion, animate
@@ -78,6 +79,8 @@ def save_landscape(landscape: Landscape, file: FilePath, *, surface: Surface | N
         If the suffix is not .rrd, the place cannot be written to, or there are no shapes.
     """
     checked_suffix("rrd", file, [SUFFIX])
+    landscape = in_units(landscape)
+    surface = None if surface is None else in_units(surface)
     path = landscape.path
     motion = animate(path)
 
@@ -131,6 +134,7 @@ class Live:
 
     def finish(self, path: Path) -> None:
         """Show the complete path; errors as in `animate`."""
+        path = in_units(path)
         motion = animate(path)
         self._stream.reset_time()
         self._stream.send_recording_name(names([path])[0])
