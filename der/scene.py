@@ -47,6 +47,8 @@ class Scene:
     shapes : whether to keep vertices and frames of every state.
     history : whether to keep how the ring moves in each snap; needs ``shapes``.
     modes : whether to compute the softest mode of each symmetry at every state; needs ``shapes``.
+    forces : whether to keep the forces and moments of the grips and in the arms; with ``shapes``
+        also force, moment and strains along the ring.
     control : "arclength" follows the path of equilibria through its folds. "angle" turns the grips,
         "moment" raises a dead moment: each state is then a minimum, and the ring snaps where the
         minimum ends.
@@ -82,6 +84,7 @@ class Scene:
     shapes: bool = False
     history: bool = False
     modes: bool = False
+    forces: bool = False
     control: str = "arclength"
     unload: bool = False
     solver: str = "newton"
@@ -101,7 +104,7 @@ class Scene:
                 raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
         self._replace("n_edges", _integer)
         sector = sector_name(self.ring, self.sector, self.n_edges)
-        for name in ("stability", "error_bars", "shapes", "history", "modes", "unload"):
+        for name in ("stability", "error_bars", "shapes", "history", "modes", "forces", "unload"):
             self._replace(name, truth)
         if self.error_bars:
             meshes(self.n_edges, sector)

@@ -13,6 +13,7 @@ import numpy as np
 from der.analysis.path_record import (
     columns,
     full_shapes,
+    kept_forces,
     mesh_numerics,
     path_record,
     recorded_points,
@@ -183,6 +184,7 @@ class _Found:
             numerics=_numerics(scene, self.ring),
             values=raw if bars is None else bars.values,
             shapes=full_shapes(scene, self.ring, self.points, modes=modes) if keeps else None,
+            forces=kept_forces(scene, self.ring, self.points),
             **entries,
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from der.geometry.mesh import sites
 from der.kernels.quaternions import Array
 from der.problem import Point, Statistics, total_index
 from der.records.configurations import Shapes
+from der.records.forces import Forces
 from der.records.path import AtPi, Path, Timing, counts
 from der.records.path import Point as RecordedPoint
 from der.rod.equilibrium import Equilibrium
@@ -102,7 +103,23 @@ def full_shapes(
     from der.analysis.full_ring import shapes
 
     arc_length = sites(scene.ring, scene.n_edges, "full")[:-1]
-    return shapes(ring, points, arc_length, history=scene.history, modes=modes)
+    found = shapes(ring, points, arc_length, history=scene.history, modes=modes)
+    if not scene.forces:
+        return found
+    from der.analysis.forces import internal
+
+    return replace(found, internal=internal(ring, points))
+
+
+def kept_forces(
+    scene: Scene, ring: GrippedRing, points: Sequence[Point[Equilibrium]]
+) -> Forces | None:
+    """Return the forces and moments of grips and arms if they were asked for."""
+    if not scene.forces or not points:
+        return None
+    from der.analysis.forces import forces
+
+    return forces(ring, points)
 
 
 def state_at_pi(ring: GrippedRing, one: Point[Equilibrium], index_free: int | None) -> AtPi:

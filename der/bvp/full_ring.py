@@ -29,11 +29,26 @@ def full_ring(system: Collocation, at: Solution, n_edges: int) -> tuple[Array, A
     Edge 0 is the first grip's, vertex j joins edges j and j + 1, whose frames stand at `sites`; the
     origin is midway between the grips. Interpolated on halved intervals, with an error of (h/2)^5.
     """
-    fine = system.on(at.mesh.halved, at)
-    if isinstance(fine, Solution):
-        at = fine
+    at = _finer(system, at)
     s = sites(system.sector.ring, n_edges, "full")
     return _places(system, at, 0.5 * (s[:-1] + s[1:])), _frames(system, at, s[:-1])
+
+
+def at_vertices(
+    system: Collocation, at: Solution, n_edges: int
+) -> tuple[Array, Array, Array, Array]:
+    """Places (2, 3) of the grips; of the vertices places, frames (N, 3, 3), and k1u (N,)."""
+    at, ring = _finer(system, at), system.sector.ring
+    s = sites(ring, n_edges, "full")
+    s = 0.5 * (s[:-1] + s[1:])
+    grips = _places(system, at, np.array([0.0, 0.5 * ring.length]))
+    return grips, _places(system, at, s), _frames(system, at, s), ring.curvature(s)
+
+
+def _finer(system: Collocation, at: Solution) -> Solution:
+    """The solution on halved intervals; itself where that is not found."""
+    fine = system.on(at.mesh.halved, at)
+    return fine if isinstance(fine, Solution) else at
 
 
 def _folded(system: Collocation, s: Array) -> tuple[Array, Flags, Flags]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from der.errors import Reason
 from der.geometry.mesh import sites
 from der.records import path as records
 from der.records.configurations import Shapes
+from der.records.forces import Forces
 from der.records.path import AtPi, Mode, Path, Timing, folding_mode, release
 from der.scene import Scene
 from der.utils.run import Run
@@ -69,6 +70,7 @@ class Followed:
         if run.reason is Reason.TURNED_BACK and at_pi is None:
             mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
         unknown = records.counts([None] * len(self.points))
+        forces = self._forces() if scene.forces and self.points else None
         return Path(
             solver="bvp",
             ring=scene.ring.to_json(),
@@ -83,7 +85,8 @@ class Followed:
             mode=mode,
             error={**errors, "how": HOW},
             timing=Timing(run.seconds, cost.newton_iterations, cost.steps),
-            shapes=self._shapes() if scene.shapes and self.points else None,
+            shapes=self._shapes(forces) if scene.shapes and self.points else None,
+            forces=forces,
             status=run.status,
             message=run.message,
             reason="" if run.reason is None else run.reason.word,
@@ -118,9 +121,21 @@ class Followed:
             "version": release(),
         }
 
-    def _shapes(self) -> Shapes:
-        """Vertices and frames of the full ring at every point."""
+    def _forces(self) -> Forces:
+        """Forces and moments of grips and arms at every point."""
+        from der.bvp.forces import forces
+
+        return forces(self.system, [point.solution for point in self.points])
+
+    def _shapes(self, forces: Forces | None) -> Shapes:
+        """Vertices and frames of the full ring at every point, and what is inside if asked for."""
         n_edges = self.scene.n_edges
         shapes = [full_ring(self.system, point.solution, n_edges) for point in self.points]
         x, frames = (np.array(parts) for parts in zip(*shapes, strict=True))
-        return Shapes(x, frames, arc_length=sites(self.scene.ring, n_edges, "full")[:-1])
+        found = Shapes(x, frames, arc_length=sites(self.scene.ring, n_edges, "full")[:-1])
+        if forces is None:
+            return found
+        from der.bvp.forces import internal
+
+        solutions = [point.solution for point in self.points]
+        return replace(found, internal=internal(self.system, solutions, forces, n_edges))

@@ -65,6 +65,28 @@ class Softest:
         _keep(self, "eigenvalues of the modes", "eigenvalues", (n, len(classes)))
 
 
+@dataclass(frozen=True, eq=False)
+class Internal:
+    """Force, moment and strains along the ring at every state; signs as in `records.forces`.
+
+    Raises
+    ------
+    ValueError
+        If an array has a wrong shape, or a value is not finite.
+    """
+
+    force: Array  # (n, N, 3) at the vertices, along E1, E2, E3, GJ/a^2
+    moment: Array  # (n, N, 3) likewise, GJ/a
+    curvature: Array  # (n, N, 3) k1, k2 and twist k3 at the vertices, 1/a
+    stretch: Array  # (n, N) strain of the edges
+
+    def __post_init__(self) -> None:
+        n, n_v, _ = _keep(self, "force along the ring", "force", ("n", "N", 3)).shape
+        for name in ("moment", "curvature"):
+            _keep(self, f"{name} along the ring", name, (n, n_v, 3))
+        _keep(self, "stretch along the ring", "stretch", (n, n_v))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Shapes:
     """The full ring at every state of a path.
@@ -79,6 +101,7 @@ class Shapes:
     softest : its softest modes, where they were asked for.
     arc_length : (N,) array
         Arc lengths of the frames from the first grip, a; None where they are evenly spaced.
+    internal : force, moment and strains along the ring, where they were asked for.
 
     Raises
     ------
@@ -91,6 +114,7 @@ class Shapes:
     falls: tuple[Fall, ...] = ()
     softest: Softest | None = None
     arc_length: Array | None = None
+    internal: Internal | None = None
 
     def __post_init__(self) -> None:
         n, n_v, _ = _keep(self, "x", "x", ("n", "N", 3)).shape
@@ -106,6 +130,12 @@ class Shapes:
         if self.softest is not None and self.softest.u.shape != self.x.shape:
             raise ValueError(
                 f"u of the modes must have shape {self.x.shape}, got {self.softest.u.shape}"
+            )
+
+        if self.internal is not None and self.internal.force.shape != self.x.shape:
+            raise ValueError(
+                f"force along the ring must have shape {self.x.shape}, "
+                f"got {self.internal.force.shape}"
             )
 
     def __repr__(self) -> str:
@@ -125,6 +155,8 @@ class Shapes:
             arrays["arc_length"] = self.arc_length
         if self.softest is not None:
             arrays |= _named("softest", self.softest)
+        if self.internal is not None:
+            arrays |= _named("internal", self.internal)
         for k, fall in enumerate(self.falls):
             arrays |= _named(f"falls/{k}", fall)
         write_whole(path, lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
@@ -146,14 +178,14 @@ class Shapes:
                 with np.load(file, allow_pickle=False) as npz:
                     arrays = {name: npz[name] for name in npz.files}
                 x, frames, places = arrays["x"], arrays["frames"], arrays.get("arc_length")
-                falls, modes = _falls(arrays), _softest(arrays)
+                falls, modes, inside = _falls(arrays), _softest(arrays), _internal(arrays)
             except Exception as problem:  # zipfile and numpy raise some ten classes on broken files
                 why = " ".join(str(problem).split())
                 raise ValueError(
                     f"{os.fspath(path)}: no shapes.npz as --out writes ({why})"
                 ) from problem
         try:
-            return cls(x, frames, falls, modes, places)
+            return cls(x, frames, falls, modes, places, inside)
         except ValueError as problem:
             raise ValueError(f"{os.fspath(path)}: {problem}") from problem
 
@@ -174,7 +206,7 @@ def _check_size(file: BinaryIO) -> None:
     file.seek(0)
 
 
-def _named(prefix: str, record: Fall | Softest) -> dict[str, Array]:
+def _named(prefix: str, record: Fall | Softest | Internal) -> dict[str, Array]:
     """The entries of a record as arrays of the file."""
     return {f"{prefix}/{name}": np.asarray(value) for name, value in vars(record).items()}
 
@@ -195,3 +227,10 @@ def _softest(arrays: Mapping[str, Array]) -> Softest | None:
         return None
     entries = {entry.name: arrays[f"softest/{entry.name}"] for entry in fields(Softest)}
     return Softest(**entries | {"classes": entries["classes"].tolist()})
+
+
+def _internal(arrays: Mapping[str, Array]) -> Internal | None:
+    """Force, moment and strains in a file, if there are any."""
+    if "internal/force" not in arrays:
+        return None
+    return Internal(**{entry.name: arrays[f"internal/{entry.name}"] for entry in fields(Internal)})

@@ -18,6 +18,7 @@ import numpy as np
 from der.errors import Reason
 from der.records.configurations import Shapes
 from der.records.entries import Checked, in_memory
+from der.records.forces import Forces
 from der.records.record import SPARSE, Record, SolveTime, Status
 from der.records.values import (
     Column,
@@ -143,6 +144,7 @@ class Path(Record, name="path", plot="path"):
     mode: Mode | None  # see `folding_mode`
     error: Json | None  # None, or gamma, moment, energy: n numbers or None; and how
     raw: Json | None = None  # with error bars: values at the finest N, by name
+    forces: Forces | None = None  # of grips and arms, where they were asked for
     timing: Timing
     shapes: Shapes | None = in_memory()
 
@@ -155,6 +157,9 @@ class Path(Record, name="path", plot="path"):
                 known[f"error.{name}"] = checks.each(
                     f"error.{name}", bars, optional(checks.checked_number)
                 )
+        if self.forces is not None:
+            for one in fields(Forces):
+                known[f"forces.{one.name}"] = list(getattr(self.forces, one.name))
         if self.shapes is not None:
             known["shapes"] = list(self.shapes.x)
         for name, values in known.items():

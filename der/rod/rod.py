@@ -132,13 +132,26 @@ def strains(rod: Rod, state: State) -> tuple[Array, Array]:
 
     The energies are those of bending and twisting, in GJ/a.
     """
+    kappa, energy, _ = _vertices(rod, state)
+    return kappa, energy
+
+
+def moments(rod: Rod, state: State) -> Array:
+    """Moments (n_s, 3) in space that the edge behind each vertex exerts on the one before, GJ/a."""
+    behind = np.arange(1, len(rod.cell) + 1) % rod.n_edges
+    in_frame = _vertices(rod, state)[2]
+    return np.asarray((rotation(state.quat[behind]) @ in_frame[:, :, None])[..., 0])
+
+
+def _vertices(rod: Rod, state: State) -> tuple[Array, Array, Array]:
+    """Strains (n_s, 3), energies (n_s,) and moments (n_s, 3) in the frames of the edges behind."""
     n, n_s = rod.n_edges, len(rod.cell)
-    kappa, energy = np.empty((n_s, 3)), np.empty(n_s)
-    p, g, hess = np.empty(4), np.empty(3), np.empty((3, 3))
+    kappa, energy, moment = np.empty((n_s, 3)), np.empty(n_s), np.empty((n_s, 3))
+    p, hess = np.empty(4), np.empty((3, 3))
     for s in range(n_s):
         relative(state.quat[s], state.quat[(s + 1) % n], p)
         if p[0] < 0.0:
             p *= -1.0
         stiff = rod.stiffness / rod.cell[s]
-        energy[s] = vertex_energy(p, rod.measure, rod.rest[s], stiff, kappa[s], g, hess)
-    return kappa, energy
+        energy[s] = vertex_energy(p, rod.measure, rod.rest[s], stiff, kappa[s], moment[s], hess)
+    return kappa, energy, moment

@@ -22,7 +22,7 @@ def title(record: Any, *more: str, mesh: bool = True) -> str:
     mesh : whether the mesh is named.
     """
     parts = [ring_text(record.ring), section_text(getattr(record, "section", {}))]
-    if record.scale is not None:
+    if getattr(record, "scale", None) is not None:
         length, name = record.scale.unit("length")
         parts.append(f"a = {length:.6g} {name}")
     if mesh:
