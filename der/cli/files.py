@@ -27,6 +27,7 @@ class PathFiles:
     movie: str | None = file_option("Animate it: .gif, or .mp4 (needs ffmpeg).")
     html: str | None = file_option("A page to scrub in any browser: .html.")
     beside: str | None = folder_option("Show the ring of this --out DIR, too, where it moves.")
+    forces: bool = option("Forces and moments of grips and arms: record, picture, shapes.", False)
     out: str | None = folder_option("Write path.json, path.png and shapes.npz here.")
     quiet: bool = option("No progress and no summary.", False)
 

@@ -30,6 +30,7 @@ def fold(ring: RingOptions, path: PathOptions, files: PathFiles, watch: LiveOpti
             shapes=playback or files.drawn,
             history=playback or files.moving,
             modes=playback and path.stability and path.solver == "newton",
+            forces=files.forces,
         )
         written = targets(files, "path", shapes=True)
         serving = served(watch.port) if watch.live else nullcontext()
@@ -51,7 +52,8 @@ def bvp(ring: RingOptions, path: PathOptions, files: PathFiles) -> int:
         from der.bvp.solve import TOLERANCE, check
 
         tolerance = TOLERANCE if path.tolerance is None else path.tolerance
-        scene = path.scene(ring, shapes=files.drawn, error_bars=False, tolerance=1e-10)
+        kept = {"shapes": files.drawn, "forces": files.forces}
+        scene = path.scene(ring, **kept, error_bars=False, tolerance=1e-10)
         check(scene, tolerance)
         written = targets(files, "path", shapes=True)
         other = files.other()

@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from der.records.forces import Forces
 from der.records.path import AtPi, Mode, Path, Point
 from der.records.text.table import change, column, floor, form, number, table, title
 from der.records.units import unit
@@ -37,6 +40,8 @@ def lines(path: Path) -> list[str]:
         found += ["", _at_pi(path.at_pi, path)]
     if path.points or path.at_pi is not None:
         found.append(ONE_ARM)
+    if path.forces is not None and len(path):
+        found += _forces(path, path.forces)
     if path.error is not None:
         found.append(_errors(path))
     t = path.timing
@@ -91,6 +96,20 @@ def _at_pi(at: AtPi, path: Path) -> str:
         f"at pi: M = {moment}{in_moment}, dM/dgamma = {at.slope:.7g}{in_moment}, "
         f"U = {energy}{in_energy}; {index}"
     )
+
+
+def _forces(path: Path, forces: Forces) -> list[str]:
+    """The largest force and moment in the arms at the grips."""
+    told = []
+    for name, values, kind in (
+        ("force in an arm", forces.arm_force, "force"),
+        ("moment in an arm at its grip", forces.arm_moment, "moment"),
+    ):
+        sizes = np.linalg.norm(values, axis=2).max(axis=1)
+        k = int(np.argmax(sizes))
+        size = f"{sizes[k]:.6g} {unit(path.scale, kind)}"
+        told.append(f"largest {name}: {size} at gamma = {path.gamma[k]:.6g}")
+    return told
 
 
 def _errors(path: Path) -> str:

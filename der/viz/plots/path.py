@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from der.records.configurations import Shapes
+from der.records.forces import Forces
 from der.records.path import Mode, Path
 from der.utils.checks import Array
 from der.viz.animation import mean_radius
 from der.viz.curve import arc_length, evenly, smooth
-from der.viz.palette import INK, POINTS
+from der.viz.palette import FREE, INK, POINTS, ROSE
 from der.viz.plots import style
 from der.viz.plots.rings import bare, place_ribbon
 from der.viz.ribbon import HALF_WIDTH, quadrilaterals
@@ -24,7 +26,12 @@ from der.viz.titles import times_pi, title
 STATE: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.2, "color": INK}
 MANY = 250  # states; more would hide the line below them
 LETTERS = "ABCDEF"  # one for each snapshot
+SIDES = {"left": 0.085, "right": 0.985}
+IN_ARM = "$F$, $m$: in the first arm, at the first grip"
 ONE_GRIP = "$M$: one arm; a torque cell on a grip reads $2M$"
+HIGH = 6.0  # inches of the part without forces
+COMPONENTS = (ROSE, FREE, INK)  # colours, of vectors along E1, E2, E3
+DASHED = ("-", "--", ":")
 CAPTION = 0.82  # room for the text below a ribbon, over the row's height
 
 
@@ -38,29 +45,50 @@ def draw(path: Path) -> Figure:
     """
     style.check_states("path", path)
     status = () if path.status == "done" else (path.status,)
-    figure = style.blank(
-        8.0, 6.0, title(path, _mode(path.mode) if path.mode else _reach(path), *status)
-    )
-    top = 0.94 if path.shapes is None else 0.665
-    above, below = style.stacked(figure, 1.45, left=0.085, right=0.985, bottom=0.125, top=top)
-    curves = ((above, path.moment), (below, path.energy))
-    for axes, height in curves:
+    share = 1.0 if path.forces is None else 1.0 / 1.5  # of the part without forces, in height
+    name = title(path, _mode(path.mode) if path.mode else _reach(path), *status)
+    figure = style.blank(8.0, HIGH / share, name)
+
+    def down(place: float) -> float:
+        """A height in the part without forces as one in the figure."""
+        return 1.0 - (1.0 - place) * share
+
+    above, below = _draw_curves(figure, path, down)
+    if path.shapes is not None:
+        largest = int(np.argmax(np.abs(path.moment)))
+        chosen = evenly(arc_length(path.shapes.x), len(LETTERS), keep=largest)
+        row = figure.add_axes((0.02, down(0.685), 0.96, 0.265 * share))
+        _draw_ribbons(row, path, path.shapes, chosen)
+        for axes, height in ((above, path.moment), (below, path.energy)):
+            places = np.column_stack([path.gamma / math.pi, height])[chosen]
+            style.place_letters(axes, LETTERS, places, smooth(path, height))
+    entries = _entries(path)
+    if path.forces is not None:
+        both = style.stacked(figure, 1.0, **SIDES, bottom=0.125 * share, top=down(0.01))
+        entries += _draw_forces(both, path, path.forces)
+        _note(figure, 0.079 * share, IN_ARM)
+    _note(figure, down(0.079), ONE_GRIP)
+    style.legend_below(figure, entries, fontsize=7.5)
+    return figure
+
+
+def _draw_curves(figure: Figure, path: Path, down: Callable[[float], float]) -> tuple[Axes, Axes]:
+    """Draw M above U; ``down`` places them in the figure."""
+    top = down(0.94 if path.shapes is None else 0.665)
+    above, below = style.stacked(figure, 1.45, **SIDES, bottom=down(0.125), top=top)
+    for axes, height in ((above, path.moment), (below, path.energy)):
         _draw_curve(axes, path, height)
         axes.yaxis.set_label_coords(-0.062, 0.5)
     style.label_axes(above, "", style.moment(path.scale, "moment of one arm"))
     style.label_axes(below, style.GAMMA, style.energy(path.scale))
     style.zero_line(above)
     below.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 2.5, 5, 10]))
-    if path.shapes is not None:
-        largest = int(np.argmax(np.abs(path.moment)))
-        chosen = evenly(arc_length(path.shapes.x), len(LETTERS), keep=largest)
-        _draw_ribbons(figure.add_axes((0.02, 0.685, 0.96, 0.265)), path, path.shapes, chosen)
-        for axes, height in curves:
-            places = np.column_stack([path.gamma / math.pi, height])[chosen]
-            style.place_letters(axes, LETTERS, places, smooth(path, height))
-    figure.text(0.985, 0.079, ONE_GRIP, ha="right", va="center", fontsize=7.5, color=INK)
-    style.legend_below(figure, _entries(path), fontsize=7.5)
-    return figure
+    return above, below
+
+
+def _note(figure: Figure, height: float, text: str) -> None:
+    """A note beside the label of an abscissa."""
+    figure.text(0.985, height, text, ha="right", va="center", fontsize=7.5, color=INK)
 
 
 def _reach(path: Path) -> str:
@@ -104,6 +132,28 @@ def _draw_curve(axes: Axes, path: Path, height: Array) -> None:
         at = [point.position for point in path.points if point.kind == kind]
         axes.plot(path.gamma[at] / math.pi, height[at], zorder=4, **style.mark(marker, size))
     axes.margins(x=0.03, y=0.12)
+
+
+def _draw_forces(axes: tuple[Axes, Axes], path: Path, forces: Forces) -> list[Any]:
+    """Draw force and moment in the first arm at the first grip; return entries of the legend."""
+    labels = (
+        style.quantity(path.scale, "force", "F", "force"),
+        style.quantity(path.scale, "moment", "m", "moment"),
+    )
+    for one, values, label, across in zip(
+        axes, (forces.arm_force, forces.arm_moment), labels, ("", style.GAMMA), strict=True
+    ):
+        for component, colour, dashes in zip(values[:, 0].T, COMPONENTS, DASHED, strict=True):
+            one.plot(*smooth(path, component).T, color=colour, linestyle=dashes, linewidth=1.6)
+        style.label_axes(one, across, label)
+        style.zero_line(one)
+        one.margins(x=0.03, y=0.12)
+        one.yaxis.set_label_coords(-0.062, 0.5)
+    looks = zip(COMPONENTS, DASHED, strict=True)
+    return [
+        style.entry(f"along $E_{i}$", color=colour, linestyle=dashes, linewidth=1.6)
+        for i, (colour, dashes) in enumerate(looks, 1)
+    ]
 
 
 def _draw_ribbons(row: Axes, path: Path, shapes: Shapes, chosen: list[int]) -> None:
