@@ -24,6 +24,8 @@ DOERS = {
     "self_crossings": ({"self_crossings": True}, "der.rod.gripped_ring.link"),
     "error bars": ({"error_bars": True}, "der.analysis.error_bars.error_bars"),
     "shapes": ({"shapes": True}, "der.analysis.full_ring.shapes"),
+    "forces": ({"forces": True}, "der.analysis.forces.forces"),
+    "forces along the ring": ({"shapes": True, "forces": True}, "der.analysis.forces.internal"),
     "modes": ({"shapes": True, "modes": True}, "der.rod.stability.softest_modes"),
     "relaxation": ({"control": "angle", "solver": "relaxation"}, "der.rod.relaxation._relax"),
 }
@@ -53,14 +55,17 @@ def test_what_is_not_asked_for_is_not_computed(need, monkeypatch):
 
 
 def test_what_is_not_asked_for_is_not_in_the_record():
-    """No index, error, raw values or shapes; with frames alone, no modes and no falls."""
+    """No index, error, raw values, forces or shapes; with frames alone, no modes and no falls."""
     path = der.fold(scene())
     assert path.error is None
+    assert path.forces is None
+    assert path.scale is None
     assert path.raw is None
     assert path.shapes is None
     assert np.ma.getmaskarray(path.index).all()
     kept = der.fold(scene(shapes=True)).shapes
     assert kept.softest is None
+    assert kept.internal is None
     assert kept.falls == ()
 
 
@@ -125,6 +130,7 @@ OPTIONAL = (
     "der.rod.relaxation",
     "der.analysis.loading_by_relaxation",
     "der.analysis.full_ring",
+    "der.analysis.forces",
     "der.viz.rerun.recording",
     "der.viz.plots.path",
     "validation",

@@ -96,6 +96,8 @@ def line(*words, without=()):
 
 
 PLANAR = ("planar", "circle", "--h-over-t", "4")
+BAR = ("fold", "circle", "--young", "3.5GPa", "--height", "4mm", "--thickness", "1mm",
+       "--size", "100mm")  # fmt: skip
 WRONG = [
     # words, and what the line must hold: option, value, what is allowed
     (line("--h-over-t", "0"), "--h-over-t", "0.0", "finite number > 0"),
@@ -220,6 +222,17 @@ WRONG = [
     (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
     (("phase", "ellipse", "--out", "d", "--range", "x=1:2"), "--range", "'x'", "h_over_t"),
     (("figure", "fig99", "--out", "."), "--name", "'fig99'", "fig2b"),
+    ((*BAR, "--young", "3.5"), "--young", "'3.5'", "such as 3.5GPa"),
+    ((*BAR, "--size", "100"), "--size", "'100'", "such as 100mm"),
+    ((*BAR, "--size", "0.5mm"), "--size", "'0.5mm'", "times the thickness"),
+    ((*BAR[:-2], "--units", "N,mm"), "--size", "none", "such as 100mm"),
+    ((*BAR, "--units", "N,mile"), "--units", "'N,mile'", "such as N,mm"),
+    ((*BAR, "--h-over-t", "4"), "--h-over-t", "4.0", "together with --young"),
+    ((*BAR, "--alpha", "1"), "--alpha", "1.0", "together with --young"),
+    ((*BAR, "--a-over-t", "50"), "--a-over-t", "50.0", "--size over --thickness"),
+    (line("--units", "N,mm"), "--units", "'N,mm'", "must go with --young"),
+    (("planar", *BAR[1:], "--distance", "1"), "--distance", "'1'", "such as 120mm"),
+    ((*PLANAR, "--distance", "1mm"), "--distance", "'1mm'", "must be a number"),
     (line("--egdes", "16"), "--egdes", "No such option", "--edges"),
     (("fold", "circle", "--h-over-t"), "--h-over-t", "requires", "argument"),
     (("bend",), "'bend'", "No such command", ""),
@@ -969,3 +982,38 @@ def test_ctrl_c_before_the_command_begins_is_told(run, monkeypatch):
 
     monkeypatch.setattr("typer.core.TyperGroup.resolve_command", press)
     assert run(*SMALL) == (130, "", ["der: stopped by the user"])
+
+
+def test_a_dimensional_ring_is_told_in_its_units(run):
+    """Headers with units, values times GJ/a, and a non-dimensional record with its scale."""
+    more = ("--edges", "16", "--no-stability", "--json", "p.json", "--plot", "p.png")
+    code, out, _ = run(*BAR, "--units", "N,mm", *more)
+    path = der.Path.load("p.json")
+    assert code == 0
+    assert path.scale.units == "N,mm"
+    assert "M [N mm]" in out
+    assert "a = 100 mm" in out
+    at_pi = path.at_pi.slope * path.scale.unit("moment")[0]
+    assert f"dM/dgamma = {at_pi:.7g} N mm" in out
+    plain = run("fold", "circle", "--h-over-t", "4", "--a-over-t", "100", *more[:3], "--json", "-")
+    np.testing.assert_array_equal(json.loads(plain[1])["moment"], path.moment)
+
+
+def test_a_distance_with_a_unit_is_one_in_a(run):
+    """120 mm of a ring of a = 100 mm."""
+    code, out, _ = run("planar", *BAR[1:], "--edges", "32", "--distance", "120mm", "--json", "-")
+    assert code == 0
+    assert json.loads(out)["goal"] == pytest.approx(1.2, rel=1e-15)
+
+
+@pytest.mark.parametrize("command", ["fold", "bvp"])
+def test_forces_are_kept_on_request(run, command):
+    """In the record and, with --out, in the shapes; in the summary, too."""
+    given = ("circle", "--h-over-t", "4", "--edges", "16", "--gamma-max", "1", "--forces")
+    code, out, _ = run(command, *given, "--out", "d")
+    path, shapes = der.Path.load("d/path.json"), der.Shapes.load("d/shapes.npz")
+    assert code == 0
+    assert path.forces.arm_force.shape == (len(path), 2, 3)
+    assert shapes.internal.moment.shape == (len(path), 16, 3)
+    largest = np.linalg.norm(path.forces.arm_force, axis=2).max()
+    assert f"largest force in an arm: {largest:.6g} GJ/a^2" in out

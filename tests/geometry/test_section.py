@@ -1,10 +1,9 @@
-"""Cross-sections: the torsion series, its limits, and the way to SI."""
+"""Cross-sections: the torsion series and its limits."""
 
 import math
 
 import pytest
 
-from der.geometry.scale import Scale
 from der.geometry.section import Section, rectangular_section, section
 
 
@@ -75,30 +74,6 @@ def test_section_is_frozen():
         section(1, 2).alpha = 3  # type: ignore[misc]
 
 
-def test_scale_of_a_square_bar():
-    """J = 0.1405770 h^4 for a square (Timoshenko and Goodier); G = E/2.6."""
-    scale = Scale.of(young_modulus=2.6e9, nu=0.3, h=1e-3, t=1e-3, a=0.2)
-    assert scale.moment == pytest.approx(1e9 * 0.1405770e-12 / 0.2, rel=1e-6)
-
-
-def test_scale_and_section_agree_on_torsion():
-    """EI1 = alpha GJ: Eq. (A.8) and Eq. (A.16) are one formula."""
-    E, h, t, a = 1.8e9, 4e-3, 1e-3, 0.2
-    GJ = Scale.of(E, 0.3, h, t, a).moment * a
-    assert rectangular_section(h / t).alpha * GJ == pytest.approx(E * h * t**3 / 12, rel=1e-14)
-
-
-def test_units_are_consistent():
-    """Energy = moment x rad = force x length."""
-    scale = Scale.of(1.8e9, 0.3, 4e-3, 1e-3, 0.2)
-    assert (scale.energy, scale.force * scale.length) == pytest.approx((scale.moment,) * 2)
-
-
-def test_scale_does_not_tell_height_from_thickness():
-    """GJ is the same for (h, t) and (t, h)."""
-    assert Scale.of(1e9, 0.3, 1e-3, 4e-3, 0.2) == Scale.of(1e9, 0.3, 4e-3, 1e-3, 0.2)
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -122,9 +97,6 @@ def test_scale_does_not_tell_height_from_thickness():
         (lambda: section(0, 1), "alpha must be a finite number > 0, got 0"),
         (lambda: section(1, None), "beta must be a finite number > 0, got None"),
         (lambda: Section(1, 1, nu=2), "nu must be a number in (-1, 0.5], got 2"),
-        (lambda: Scale.of(0, 0.3, 1, 1, 1), "young_modulus must be a finite number > 0, got 0"),
-        (lambda: Scale.of(1, 0.3, 1, 1, math.nan), "a must be a finite number > 0, got nan"),
-        (lambda: Scale.of(1, 0.3, 1, 1e-200, 1), "GJ must be a finite number > 0, got 0.0"),
     ],
 )
 def test_bad_input_is_named(make, message):
