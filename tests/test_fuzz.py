@@ -82,9 +82,9 @@ MAKERS = {
     der.section: ("alpha", "beta"),
     der.rectangular_section: ("h_over_t", "nu"),
     der.Scale.of: ("young_modulus", "nu", "h", "t", "a"),
-    der.Scale: ("moment", "energy", "length", "force"),
+    der.Scale: ("a", "GJ"),
 }
-OTHERS = ("alpha", "beta", "moment", "energy", "length", "force")  # that may overflow
+OTHERS = ("alpha", "beta", "GJ", "moment", "force")  # that may overflow
 
 
 @fuzz("quick")
@@ -105,7 +105,16 @@ WANTS = {
     "until": st.one_of(st.none(), junk),
     "save_at": st.one_of(st.none(), st.lists(numbers, max_size=4), junk),
 }
-FLAGS = ("stability", "self_crossings", "error_bars", "shapes", "history", "modes", "unload")
+FLAGS = (
+    "stability",
+    "self_crossings",
+    "error_bars",
+    "shapes",
+    "history",
+    "modes",
+    "forces",
+    "unload",
+)
 SIZES = ("gamma_max", "a_over_t", "tolerance")
 WANTS |= {name: st.one_of(st.booleans(), junk) for name in FLAGS}
 WANTS |= {name: st.one_of(st.floats(1e-6, 4.0), junk) for name in SIZES}

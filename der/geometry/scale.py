@@ -191,8 +191,9 @@ def dimensional(
     a = quantity("size", size, LENGTHS, "100mm")
     if not 1.0 <= a / t <= THINNEST:
         raise ValueError(f"size must be 1 to {THINNEST:g} times the thickness, got {size!r}")
-    return {
-        "section": rectangular_section(h / t, nu),
-        "a_over_t": a / t,
-        "scale": replace(Scale.of(E, nu, h, t, a), units=units),
-    }
+    scale = replace(Scale.of(E, nu, h, t, a), units=units)
+    try:
+        section = rectangular_section(h / t, nu)
+    except ValueError as wrong:  # not what the user gave
+        raise ValueError(f"height over thickness is too extreme: {wrong}") from None
+    return {"section": section, "a_over_t": a / t, "scale": scale}

@@ -129,7 +129,7 @@ def torsion_constant(h: float, t: float) -> float:
     Paper, Eq. (A.8); J does not change when h and t are exchanged.
     """
     thickness, width = sorted((positive("h", h), positive("t", t)))
-    return width * thickness**3 / 3 * _torsion_factor(width / thickness)
+    return width * thickness * thickness * thickness / 3 * _torsion_factor(width / thickness)
 
 
 def _torsion_factor(width_over_thickness: float) -> float:

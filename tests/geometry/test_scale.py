@@ -116,6 +116,8 @@ def test_what_is_shown_is_in_the_units_asked_for(units, quantity, factor, name):
         (lambda: Scale.of(0, 0.3, 1, 1, 1), "young_modulus must be a finite number > 0, got 0"),
         (lambda: Scale.of(1, 0.3, 1, 1, math.nan), "a must be a finite number > 0, got nan"),
         (lambda: Scale.of(1, 0.3, 1, 1e-200, 1), "GJ must be a finite number > 0, got 0.0"),
+        (lambda: Scale.of(1, 0.3, 1e200, 1e200, 1), "GJ must be a finite number > 0, got inf"),
+        (lambda: dimensional(**GIVEN | {"height": "1e300m"}), "height over thickness is too"),
         (lambda: Scale(0.0, 1.0), "a must be a finite number > 0, got 0.0"),
         (lambda: Scale(1e-200, 1e200), "moment must be a finite number > 0, got inf"),
         (lambda: Scale(1.0, 1.0, "N"), "units must be one of force (N, kN, mN"),

@@ -69,7 +69,10 @@ PERHAPS: dict[str, Any] = {
 }
 
 
-SWITCHES = ("stability", "self_crossings", "error_bars", "shapes", "history", "modes", "unload")
+SWITCHES = (
+    *("stability", "self_crossings", "error_bars", "shapes"),
+    *("history", "modes", "forces", "unload"),
+)
 CHOICES = ("sector", "control", "solver", "curvature", "stretch", "until")  # of a scene
 
 
@@ -118,14 +121,14 @@ def _of_sections() -> Iterator[Argument]:
     yield _numbers("section", "beta", lambda v: section(1.0, v), **positive)
     yield Argument("Section", ("h_over_t",), lambda v: Section(1.0, 1.0, v), _but("none"))
     yield Argument("Section", ("nu",), lambda v: Section(1.0, 1.0, 1.0, v), _but("none"))
-    units = "moment energy length force"
+    units = "a GJ moment force"
     usual = {"young_modulus": 1e9, "nu": 0.3, "h": 1.0, "t": 0.1, "a": 10.0}
     for name in usual:
         refused = {} if name == "nu" else positive
         yield _numbers("Scale.of", f"{name} {units}", _with(Scale.of, usual, name), **refused)
-    ones = dict.fromkeys(units.split(), 1.0)
+    ones = {"a": 1.0, "GJ": 1.0}
     for name in ones:
-        yield _numbers("Scale", name, _with(Scale, ones, name), **positive)
+        yield _numbers("Scale", f"{name} {units}", _with(Scale, ones, name), **positive)
 
 
 def _with(
