@@ -106,7 +106,7 @@ def full_shapes(
     found = shapes(ring, points, arc_length, history=scene.history, modes=modes)
     if not scene.forces:
         return found
-    from der.analysis.forces import internal
+    from der.rod.forces import internal
 
     return replace(found, internal=internal(ring, points))
 
@@ -117,7 +117,7 @@ def kept_forces(
     """Return the forces and moments of grips and arms if they were asked for."""
     if not scene.forces or not points:
         return None
-    from der.analysis.forces import forces
+    from der.rod.forces import forces
 
     return forces(ring, points)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -17,7 +18,6 @@ from der.errors import Reason
 from der.geometry.mesh import sites
 from der.records import path as records
 from der.records.configurations import Shapes
-from der.records.forces import Forces
 from der.records.path import AtPi, Mode, Path, Timing, folding_mode, release
 from der.scene import Scene
 from der.utils.run import Run
@@ -70,7 +70,6 @@ class Followed:
         if run.reason is Reason.TURNED_BACK and at_pi is None:
             mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
         unknown = records.counts([None] * len(self.points))
-        forces = self._forces() if scene.forces and self.points else None
         return Path(
             solver="bvp",
             ring=scene.ring.to_json(),
@@ -85,8 +84,7 @@ class Followed:
             mode=mode,
             error={**errors, "how": HOW},
             timing=Timing(run.seconds, cost.newton_iterations, cost.steps),
-            shapes=self._shapes(forces) if scene.shapes and self.points else None,
-            forces=forces,
+            **self._kept(),
             status=run.status,
             message=run.message,
             reason="" if run.reason is None else run.reason.word,
@@ -121,21 +119,24 @@ class Followed:
             "version": release(),
         }
 
-    def _forces(self) -> Forces:
-        """Forces and moments of grips and arms at every point."""
-        from der.bvp.forces import forces
+    def _kept(self) -> dict[str, Any]:
+        """The shapes and forces that were asked for, by their entries."""
+        scene, solutions = self.scene, [point.solution for point in self.points]
+        kept: dict[str, Any] = {}
+        if scene.shapes and solutions:
+            kept["shapes"] = self._shapes(solutions)
+        if scene.forces and solutions:
+            from der.bvp.forces import forces, internal
 
-        return forces(self.system, [point.solution for point in self.points])
+            found = kept["forces"] = forces(self.system, solutions)
+            if scene.shapes:
+                inside = internal(self.system, solutions, found, scene.n_edges)
+                kept["shapes"] = replace(kept["shapes"], internal=inside)
+        return kept
 
-    def _shapes(self, forces: Forces | None) -> Shapes:
-        """Vertices and frames of the full ring at every point, and what is inside if asked for."""
+    def _shapes(self, solutions: Sequence[Solution]) -> Shapes:
+        """Vertices and frames of the full ring at every point."""
         n_edges = self.scene.n_edges
-        shapes = [full_ring(self.system, point.solution, n_edges) for point in self.points]
+        shapes = [full_ring(self.system, at, n_edges) for at in solutions]
         x, frames = (np.array(parts) for parts in zip(*shapes, strict=True))
-        found = Shapes(x, frames, arc_length=sites(self.scene.ring, n_edges, "full")[:-1])
-        if forces is None:
-            return found
-        from der.bvp.forces import internal
-
-        solutions = [point.solution for point in self.points]
-        return replace(found, internal=internal(self.system, solutions, forces, n_edges))
+        return Shapes(x, frames, arc_length=sites(self.scene.ring, n_edges, "full")[:-1])

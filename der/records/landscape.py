@@ -17,6 +17,7 @@ from der.geometry.scale import Scale
 from der.records.entries import Checked, in_memory
 from der.records.path import Path, Timing
 from der.records.record import Record, SolveTime, Status
+from der.records.units import unit
 from der.records.values import (
     Count,
     Estimates,
@@ -118,7 +119,11 @@ class Landscape(Record, name="landscape", kind="landscape", plot="landscape"):
     def facts(self) -> list[str]:
         """How many states with M = 0, and the barrier to open."""
         known = self.barriers.open
-        barrier = "no barrier to open" if known is None else f"barrier to open {known:.6g}"
+        barrier = (
+            "no barrier to open"
+            if known is None
+            else f"barrier to open {known:.6g} {unit(self.scale, 'energy')}"
+        )
         return [f"{len(self.rests)} states with M = 0", barrier]
 
     @property
@@ -209,7 +214,8 @@ class Pass(Record, name="barrier of the free ring", kind="pass", plot="minimum_e
     def facts(self) -> list[str]:
         """Its barriers."""
         known = {"fold": self.fold, "open": self.open}
-        return [f"{n} none" if v is None else f"{n} {v:.6g}" for n, v in known.items()]
+        energy = unit(self.scale, "energy")
+        return [f"{n} none" if v is None else f"{n} {v:.6g} {energy}" for n, v in known.items()]
 
     @property
     def fold(self) -> float | None:

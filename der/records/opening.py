@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 from der.records.entries import Checked, Entry, in_memory
 from der.records.record import Record, SolveTime, Status
+from der.records.units import unit
 from der.records.values import (
     Count,
     Estimates,
@@ -120,8 +121,12 @@ class LeastPush(Record, name="least push", kind="push", plot="opening"):
 
     def facts(self) -> list[str]:
         """The least work of any slow push."""
-        best = self.best
-        work = "no push opens it" if best is None else f"work {best.held.work:.6g} by {best.kind}"
+        best, energy = self.best, unit(self.scale, "energy")
+        work = (
+            "no push opens it"
+            if best is None
+            else f"work {best.held.work:.6g} {energy} by {best.kind}"
+        )
         return [f"{len(self.pushes)} pushes", work]
 
     @property

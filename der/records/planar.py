@@ -11,6 +11,7 @@ from typing import Annotated
 from der.records.configurations import Shapes
 from der.records.entries import Checked, in_memory
 from der.records.record import RingRecord, SolveTime
+from der.records.units import unit
 from der.records.values import Column, Count, Integer, Number, Text, along, gaps, one_of
 from der.utils.checks import Array
 
@@ -109,7 +110,10 @@ class Squeeze(RingRecord, name="squeeze of a ring", kind="squeeze", plot="squeez
 
     def facts(self) -> list[str]:
         """Between which distances."""
-        ends = f"{self.distance[0]:.6g} to {self.distance[-1]:.6g}" if len(self) else "-"
+        ends = "-"
+        if len(self):
+            length = unit(self.scale, "length")
+            ends = f"{self.distance[0]:.6g} to {self.distance[-1]:.6g} {length}"
         return [f"distance {ends}", f"{len(self)} states"]
 
     def __len__(self) -> int:

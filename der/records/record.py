@@ -186,7 +186,11 @@ class Record(Checked, Shown, Saved):
 
     def _all_facts(self) -> list[str]:
         """The ring, what is special, and the status."""
-        return [str(self.ring.get("shape")), *self.facts(), getattr(self, "status", "done")]
+        return [
+            str(self.ring.get("shape")),
+            *in_units(self).facts(),
+            getattr(self, "status", "done"),
+        ]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -13,16 +13,9 @@ from der.records.units import unit
 def lines(found: Comparison) -> list[str]:
     """The differences at the states that were asked for, and at folds and limits."""
     asked, digits = _asked(found), form(found, ".9f")
-    moment = "" if found.scale is None else f" [{unit(found.scale, 'moment')}]"
-    heads = (
-        ("", -8),
-        ("gamma", 12),
-        (f"M rod{moment}", 16 if moment else 14),
-        (f"M bvp{moment}", 16 if moment else 14),
-        ("distance", 11),
-        ("bar", 10),
-        ("", 0),
-    )
+    moment, wide = ("", 14) if found.scale is None else (f" [{unit(found.scale, 'moment')}]", 16)
+    moments = ((f"M {solver}{moment}", wide) for solver in ("rod", "bvp"))
+    heads = (("", -8), ("gamma", 12), *moments, ("distance", 11), ("bar", 10), ("", 0))
     rows = [
         (
             state.kind,
