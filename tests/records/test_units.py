@@ -190,3 +190,10 @@ def test_a_summary_says_whose_moment_it_is():
     for name in ("path", "comparison"):
         said = summary(KINDS[name].load(FILES / f"{name}.json"))
         assert "a torque cell on one grip reads 2 M" in said
+
+
+def test_a_record_in_print_has_units():
+    """Its facts, too."""
+    for name, unit in (("landscape", " J"), ("pass", " J"), ("push", " J "), ("squeeze", " m")):
+        assert unit in repr(dimensional(name))
+        assert "GJ" not in repr(dimensional(name))
