@@ -19,13 +19,8 @@ FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "lbf": 4.4482216152605}
 STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": 6894.757293168361}
 SI = "N,m"
 THINNEST = 1e6  # a/t; above it, rounding of EA hides bending
-DIMENSIONS = {  # powers of force and length
-    "moment": (1, 1),
-    "energy": (1, 1),
-    "force": (1, 0),
-    "length": (0, 1),
-    "curvature": (0, -1),
-}
+# powers of force and length
+DIMENSIONS = {"moment": (1, 1), "energy": (1, 1), "force": (1, 0), "length": (0, 1)}
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?) ?([A-Za-zµμ]+)")
 
 
@@ -123,12 +118,9 @@ class Scale:
         factor = (self.force / FORCES[force]) ** powers[0] * (self.a / LENGTHS[length]) ** powers[1]
         if quantity == "energy" and self.units == SI:
             return factor, "J"
-        name = " ".join(
-            unit if power == 1 else f"{unit}^{power}"
-            for unit, power in zip((force, length), powers, strict=True)
-            if power
+        return factor, " ".join(
+            unit for unit, power in zip((force, length), powers, strict=True) if power
         )
-        return factor, name.replace(f"{length}^-1", f"1/{length}")
 
     @classmethod
     def of(cls, young_modulus: float, nu: float, h: float, t: float, a: float) -> Self:

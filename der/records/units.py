@@ -16,7 +16,7 @@ from der.records.entries import Checked
 
 Kind = TypeVar("Kind")
 
-PLAIN = {"moment": "GJ/a", "energy": "GJ/a", "force": "GJ/a^2", "length": "a", "curvature": "1/a"}
+PLAIN = {"moment": "GJ/a", "energy": "GJ/a", "force": "GJ/a^2", "length": "a"}
 _HEADS = {"moment": "a/GJ", "energy": "a/GJ", "force": "a^2/GJ", "length": "a"}
 _QUANTITIES = {  # of entries that texts and pictures show
     "moment": "moment rod_moment bvp_moment slope slope_at_pi grip_moment arm_moment",
