@@ -54,8 +54,9 @@ def test_public_names_exist(name):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_run(name):
+def test_examples_run(name, tmp_path, monkeypatch):
     """Every block of Python in its page, in a namespace of its own."""
+    monkeypatch.chdir(tmp_path)
     for block in re.findall(r"```python\n(.*?)```", NAMES[name].read_text(), re.DOTALL):
         exec(compile(block, name, "exec"), {"__name__": "example"})  # a page of this repository
 

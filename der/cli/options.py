@@ -52,7 +52,9 @@ class RingOptions:
     young: str | None = option("Young's modulus with its unit, 3.5GPa: answers have units.")
     height: str | None = option("Height of the section, with --young: 10mm.")
     thickness: str | None = option("Thickness of the section, with --young: 1mm.")
-    size: str | None = option("Reference length a, with --young: 100mm.")
+    size: str | None = option(
+        "Reference length a, with --young: 100mm; a profile's lengths are in its unit, or in a."
+    )
     units: str | None = option("Of force and length in answers, with --young: N,m or N,mm ...")
 
     def ring(self) -> Ring:
@@ -82,7 +84,7 @@ class RingOptions:
         if self.shape == "profile":
             from der.geometry.profile_csv import read_profile
 
-            ring = read_profile(str(self.file), self.axis)
+            ring = read_profile(str(self.file), self.axis, self.size)
             _warn_if_unsure(ring)
             return ring
         values = {name: getattr(self, name) for name in own}

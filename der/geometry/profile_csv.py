@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from der.geometry.shapes import profile
+import numpy as np
+
+from der.geometry.scale import LENGTHS, number_and_unit
+from der.geometry.shapes import DATA, profile
 from der.geometry.table import read_table
 from der.utils.checks import shown
 
@@ -29,10 +33,11 @@ PLACES = (
     ("y", "z"),
 )  # names of the coordinates of points
 LARGEST = 2**27  # bytes: three million points
+ALIKE = 3.0  # a over half the larger extent, or the inverse
 
 
-def read_profile(file: str, twist_axis: str | None = None) -> Ring:
-    """Return the ring of a file, in units of half its larger extent.
+def read_profile(file: str, twist_axis: str | None = None, size: str | None = None) -> Ring:
+    """Return the ring of a file, in units of half its larger extent or of a size that is given.
 
     Parameters
     ----------
@@ -45,6 +50,10 @@ def read_profile(file: str, twist_axis: str | None = None) -> Ring:
         "arc_length" and "curvature".
     twist_axis : str, optional
         Of several mirror axes "x", the shortest, or "y", the longest: see `shapes.profile`.
+    size : str, optional
+        The reference length a, with its unit. The lengths of the file are then in this unit, 100 in
+        the file being "100 mm", or in units of a, 1 in the file being "100 mm": whichever makes a
+        like half the larger extent.
 
     Raises
     ------
@@ -64,14 +73,35 @@ def read_profile(file: str, twist_axis: str | None = None) -> Ring:
         raise ValueError(f"file must be a text file, got {file!r}")
     try:
         if path.suffix == ".json":
-            return profile(**_of_json(text), twist_axis=twist_axis, resized=True)  # type: ignore[arg-type]
-        table = read_table(text)
-        first = f" (numbers from line {table.line} on)"
-        return profile(**_columns(table), twist_axis=twist_axis, resized=True)  # type: ignore[arg-type]
+            given = _of_json(text)
+        else:
+            table = read_table(text)
+            first = f" (numbers from line {table.line} on)"
+            given = _columns(table)
+        ring = profile(**given, twist_axis=twist_axis, resized=True)  # type: ignore[arg-type]
+        return ring if size is None else _sized(ring, size)
     except (ValueError, TypeError, RecursionError) as wrong:
-        if str(wrong).startswith("twist_axis"):
+        if str(wrong).startswith(("twist_axis", "size")):
             raise
         raise ValueError(f"file {file!r}{first}: {wrong}") from None
+
+
+def _sized(ring: Ring, size: str) -> Ring:
+    """Return a ring in units of the size that the user gives, instead of half its extent."""
+    number, unit = number_and_unit("size", size, LENGTHS, "100mm")
+    data = {name: ring.parameters[name] for name in DATA if name in ring.parameters}
+    extent = data.get("reference_length", 1.0)
+    fits = [a for a in dict.fromkeys((number, 1.0)) if 1.0 / ALIKE < extent / a < ALIKE]
+    if len(fits) != 1:
+        why = "neither is" if not fits else "both are, so give it in another unit"
+        raise ValueError(
+            f"size must be like half the larger extent of the profile, {extent:.6g}, in the unit "
+            f"of --size ({unit}) or with 1 for a: {why}, got {size!r}"
+        )
+    (a,) = fits
+    s, k = (np.array(ring.parameters[name]) for name in ("arc_length", "curvature"))
+    same = profile(s * (extent / a), k / (extent / a))
+    return replace(same, parameters={**same.parameters, **data, "reference_length": a})
 
 
 def _decoded(content: bytes) -> str | None:

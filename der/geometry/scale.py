@@ -27,6 +27,17 @@ _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?) ?([A-Za-zµμ
 def quantity(name: str, value: object, units: Mapping[str, float], example: str) -> float:
     """Return a number > 0 that is given with its unit, such as "3.5 GPa", in SI units.
 
+    Parameters and errors are those of `number_and_unit`.
+    """
+    number, unit = number_and_unit(name, value, units, example)
+    return positive(name, number * units[unit])
+
+
+def number_and_unit(
+    name: str, value: object, units: Mapping[str, float], example: str
+) -> tuple[float, str]:
+    """Return a number > 0 and the unit with which it is given.
+
     Parameters
     ----------
     units : the units that are allowed, with their values in SI units.
@@ -38,14 +49,14 @@ def quantity(name: str, value: object, units: Mapping[str, float], example: str)
         If it is no such text.
     """
     found = _NUMBER.fullmatch(value.strip()) if isinstance(value, str) else None
-    unit = units.get(re.sub("[µμ]", "u", found[2])) if found else None
-    number = math.nan if found is None or unit is None else float(found[1]) * unit
-    if not 0.0 < number < math.inf:
+    number = math.nan if found is None else float(found[1])
+    unit = "" if found is None else re.sub("[µμ]", "u", found[2])
+    if unit not in units or not 0.0 < number < math.inf:
         raise ValueError(
             f"{name} must be a number > 0 with its unit ({', '.join(units)}), such as {example}, "
             f"got {shown(value)}"
         )
-    return number
+    return number, unit
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.special import ellipe
 
 import der
 from der.geometry.outline import arc, closed_curve, straight
@@ -229,3 +230,28 @@ def test_a_measured_hexagon_folds_like_the_hexagon(axis, largest):
     path = der.fold(der.Scene(ring, section, n_edges=256, self_crossings=False))
     unit = 100 / ring.parameters["reference_length"]
     assert path.moment.max() * unit == pytest.approx(largest, rel=1e-3)
+
+
+@pytest.mark.parametrize("unit", [1.0, 100.0])
+def test_size_is_the_reference_length(unit, tmp_path):
+    """Lengths in units of a, or in the unit of the size: the same ring, an ellipse with b = a."""
+    file = tmp_path / "ring.csv"
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    np.savetxt(file, unit * np.column_stack([0.9 * np.cos(angle), 0.6 * np.sin(angle)]))
+    ring = read_profile(str(file), None, "100mm")
+    assert ring.parameters["reference_length"] == unit
+    assert ring.length == pytest.approx(0.9 * 4 * ellipe(1 - (2 / 3) ** 2), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("size", "why"),
+    [("100", "with its unit"), ("10cm", "neither is"), ("2cm", "both are"), ("0mm", "> 0")],
+)
+def test_size_unlike_the_profile_is_refused(size, why, tmp_path):
+    """What the lengths of the file mean must be certain."""
+    file = tmp_path / "ring.csv"
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    scale = 90.0 if size == "10cm" else 1.0
+    np.savetxt(file, scale * np.column_stack([np.cos(angle), 0.6 * np.sin(angle)]))
+    with pytest.raises(ValueError, match=f"size must be .*{why}"):
+        read_profile(str(file), None, size)
