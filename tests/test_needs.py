@@ -124,7 +124,7 @@ def test_stretch_takes_unknowns_only_where_it_is_finite(stretching, block):
 
 OPTIONAL = (
     "der.analysis.error_bars",
-    "der.analysis.extrapolated_curve",
+    "der.analysis.extrapolation.curve",
     "der.analysis.loading",
     "der.analysis.snap",
     "der.rod.relaxation",
@@ -144,7 +144,7 @@ NEEDED = {
     "": set(),
     "error_bars=True, shapes=True": {
         "der.analysis.error_bars",
-        "der.analysis.extrapolated_curve",
+        "der.analysis.extrapolation.curve",
         "der.analysis.full_ring",
     },
     "control='angle'": {"der.analysis.loading", "der.analysis.snap", "der.rod.relaxation"},

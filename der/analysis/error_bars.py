@@ -1,7 +1,8 @@
 """Error bars: the path on N, N/2 and N/4 edges, extrapolated state by state (Richardson, Romberg).
 
 The states of the three meshes are matched one by one, and moved to their places on the extrapolated
-curve (`extrapolated_curve`). An error is the last correction of the extrapolation.
+curve (`extrapolation.curve`). An error is the last correction of the extrapolation, and an estimate
+of what is left after it (`extrapolation.remaining_error`).
 """
 
 from __future__ import annotations
@@ -12,23 +13,18 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 
 import numpy as np
-from numpy.typing import NDArray
 
-from der.analysis.extrapolated_curve import GAMMA, LEVELS, MOMENT, RATE, Family, Place, placed
-from der.analysis.extrapolated_folds import all_asked, arc_lengths
+from der.analysis.extrapolation.curve import Family, Place, placed
+from der.analysis.extrapolation.folds import all_asked, arc_lengths
+from der.analysis.extrapolation.remaining_error import Corrections, scales_of
 from der.analysis.path_record import COLUMNS, columns
 from der.analysis.request import EIGHTH, LOOSE_TURN, Request
-from der.continuation.richardson import romberg
 from der.errors import ContinuationFailed
 from der.kernels.quaternions import Array
 from der.problem import Point
 from der.records.path import AtPi, Mode
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
-
-_EXACT = 1e-9  # of the largest values: a state that is the same on every mesh, as the folded one
-_REST = 3.0  # see `_Corrections.bound`
-_SMALL = 0.01  # of the largest first correction: smaller ones do not count for their ratio
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,7 @@ def _extrapolated(
     points = all_asked(family, request, points, asked)
     places = list(placed(family, points, asked))
     order = _order(arc_lengths(rings[0], points), places)
-    scales = _scales(family, points)
+    scales = scales_of(family, points)
     return _bars(family, _certain(points, order), [places[k] for k in order], scales)
 
 
@@ -151,7 +147,7 @@ def _bars(
     scales: Array,
 ) -> ErrorBars:
     """Values and errors of points at their places on the extrapolated curve."""
-    corrections = _Corrections.of(places, scales)
+    corrections = Corrections.of(places, scales)
     bounds = [corrections.bound(k) for k in range(len(places))]
     raw = columns(family.rings[0], points)
     table = np.array(list(raw.values()))
@@ -159,7 +155,8 @@ def _bars(
         if place is not None:
             table[:, k] = place.values
     values = dict(zip(COLUMNS, table, strict=True))
-    slope, slope_error = _slope_at_pi(places, points, corrections)
+    arrived = (k for k, v in enumerate(points) if not v.kind and v.solution.parameter == math.pi)
+    slope, slope_error = corrections.slope(next(arrived, None))
     error: dict[str, object] = {
         name: [None if b is None else float(b[c]) for b in bounds] for c, name in enumerate(COLUMNS)
     }
@@ -186,91 +183,12 @@ def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
     return sorted(kept, key=lambda k: at[k])
 
 
-def _scales(family: Family, points: Sequence[Point[Equilibrium]]) -> Array:
-    """Scales (6,) of the columns of a table: pi and the largest |M| and |U|."""
-    values = np.array([family.values(0, point.solution) for point in points]).reshape(-1, RATE)
-    largest = np.abs(values).max(axis=0, initial=0.0)
-    largest[GAMMA] = math.pi
-    return np.tile(np.where(largest > 0.0, largest, 1.0), 2)
-
-
-@dataclass(frozen=True)
-class _Corrections:
-    """The corrections of the two extrapolations at the states of a path."""
-
-    places: Sequence[Place | None]
-    first: Array  # (n, 6) T10 - T00; zero if there is no state
-    last: Array  # (n, 6) T20 - T10
-    exact: NDArray[np.bool_]  # (n,) the same on every mesh; or no state
-    rest: float  # estimate of all further corrections, as a fraction of the first
-    remainder: Array  # (n, 6) the same, in the columns of the table
-
-    @classmethod
-    def of(cls, places: Sequence[Place | None], scales: Array) -> _Corrections:
-        """Corrections at these places."""
-        none = np.zeros((LEVELS, 6))
-        changes = np.array(
-            [np.diff(romberg(none if p is None else p.table), axis=0) for p in places]
-        ).reshape(-1, 2, 6)
-        first, last = changes[:, 0], changes[:, 1]
-        sizes = np.linalg.norm(changes[:, :, :RATE] / scales[:RATE], axis=2)
-        exact = sizes[:, 0] < _EXACT
-        small = _SMALL * sizes[:, 0].max(initial=0.0)
-        ratio = (sizes[~exact, 1] / np.maximum(sizes[~exact, 0], small)).max(initial=0.0)
-        rest = float(_REST * ratio * ratio)
-        halves = np.linalg.norm((first / scales).reshape(-1, 2, RATE), axis=2)
-        return cls(places, first, last, exact, rest, rest * scales * np.repeat(halves, RATE, 1))
-
-    def bound(self, k: int) -> Array | None:
-        """Errors (3,) of the values at a place; None: they are not known.
-
-        Notes
-        -----
-        The last correction, T20 - T10, is several times the error of T20 if the series in h
-        converges well. It may pass through zero where the error does not. So the largest one of a
-        state and its two neighbours is used, and an estimate of further corrections is added, by a
-        geometric series: the first correction times the square of the largest ratio of the two
-        along the path, times `_REST`. States close to the flat one, with almost no correction, do
-        not count for that ratio. An error is at least the residual of the states.
-        """
-        place = self.places[k]
-        if place is None or not place.sought:
-            return None
-        floor = 2.0 * place.residual * np.any(place.spread != 0.0, axis=1)
-        if self.exact[k]:
-            return np.abs(place.spread @ self.last[k]) + floor
-        near = [j for j in (k - 1, k, k + 1) if 0 <= j < len(self.places) and not self.exact[j]]
-        last = np.abs(self.last[near] @ place.spread.T).max(axis=0)
-        return last + np.abs(place.spread) @ self.remainder[k] + floor
-
-
-def _slope_at_pi(
-    places: Sequence[Place | None], points: Sequence[Point[Equilibrium]], corrections: _Corrections
-) -> tuple[float | None, float | None]:
-    """dM/dgamma at the first arrival at pi, and its error."""
-    found = [k for k, v in enumerate(points) if v.kind == "" and v.solution.parameter == math.pi]
-    place = places[found[0]] if found else None
-    if place is None:
-        return None, None
-    k = found[0]
-    gamma_rate, moment_rate = place.table[:, RATE + GAMMA], place.table[:, RATE + MOMENT]
-    plain, once, twice = romberg(moment_rate / gamma_rate)
-    # and its change if the state lies elsewhere on the curve
-    change = romberg(
-        (place.bend[:, MOMENT] - moment_rate / gamma_rate * place.bend[:, GAMMA]) / gamma_rate
-    )[-1]
-    away = (abs(corrections.last[k, GAMMA]) + corrections.remainder[k, GAMMA]) / gamma_rate[0]
-    error = abs(twice - once) + corrections.rest * abs(once - plain) + abs(change * away)
-    return float(twice), float(error)
-
-
 def _how(rings: Sequence[GrippedRing], bounds: Sequence[Array | None]) -> str:
     """How the errors were computed, in a sentence."""
     sizes = ", ".join(str(_edges(ring)) for ring in rings)
     text = (
         f"Romberg extrapolation from {sizes} edges, states matched in the planes normal to the path"
-        " of the finest; an error is the last correction, the largest of a state and its"
-        " neighbours, and an estimate of those to come"
+        " of the finest; an error is the last correction and an estimate of those to come"
     )
     missing = sum(bound is None for bound in bounds)
     if missing:

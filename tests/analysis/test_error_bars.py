@@ -10,7 +10,7 @@ import pytest
 import der
 import der.records.path
 from der.analysis.error_bars import ErrorBars, error_bars
-from der.analysis.extrapolated_curve import GAMMA, Family, Goal, Matched, _found, placed
+from der.analysis.extrapolation.curve import GAMMA, Family, Goal, Matched, _found, placed
 from der.analysis.request import Request
 from der.continuation.richardson import romberg
 from der.problem import Point

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import der
-from der.analysis.extrapolated_curve import RATE, Family
-from der.analysis.mesh_transfer import Restricted, restricted
+from der.analysis.extrapolation.curve import RATE, Family
+from der.analysis.extrapolation.mesh_transfer import Restricted, restricted
 from der.analysis.request import Request
 from der.continuation.step import Step
 from der.problem import PLANE, Increment, Point, Statistics

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from der.analysis.curve_distance import curve_error
-from der.analysis.extrapolated_curve import ENERGY, GAMMA, MOMENT, RATE, Family
+from der.analysis.extrapolation.curve import ENERGY, GAMMA, MOMENT, RATE, Family
 from der.analysis.request import Request, ring_of
 from der.continuation.richardson import romberg
 from der.kernels.quaternions import Array

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from der.analysis.extrapolated_curve import FARTHEST, GAMMA, Family, Place, SoughtPoint, placed
+from der.analysis.extrapolation.curve import FARTHEST, GAMMA, Family, Place, SoughtPoint, placed
 from der.analysis.request import Request
 from der.continuation.richardson import romberg
 from der.kernels.quaternions import Array

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from der.analysis.mesh_transfer import Restricted, restricted
+from der.analysis.extrapolation.mesh_transfer import Restricted, restricted
 from der.continuation.richardson import romberg
 from der.kernels.quaternions import Array
 from der.problem import PLANE, Point
