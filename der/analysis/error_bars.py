@@ -16,6 +16,7 @@ import numpy as np
 
 from der.analysis.extrapolation.curve import Family, Place, placed
 from der.analysis.extrapolation.folds import all_asked, arc_lengths
+from der.analysis.extrapolation.located import located, marked
 from der.analysis.extrapolation.remaining_error import Corrections, scales_of
 from der.analysis.path_record import COLUMNS, columns
 from der.analysis.request import EIGHTH, LOOSE_TURN, Request
@@ -69,10 +70,10 @@ def error_bars(
     -----
     Folds and limits move to those of the extrapolated curve, a little forward or backward on the
     path. States that were not asked for and that they pass are left out: their index would be that
-    of the other side. Branch points and self-crossings are located on N edges only; they have
-    values on the extrapolated curve, but no errors. Indices, and the mode apart from its slope, are
-    those of N edges, and unknown if the extrapolation moves a state past a fold or branch point. If
-    the path of the coarsest mesh ends elsewhere, values are not extrapolated, and errors unknown.
+    of the other side. Branch points and self-crossings that a coarser mesh lacks have values on the
+    extrapolated curve, but no errors. Indices, and the mode apart from its slope, are those of N
+    edges, and unknown if the extrapolation moves a state past a fold or branch point. If the path
+    of the coarsest mesh ends elsewhere, values are not extrapolated, and errors unknown.
     """
     end = _end(rings[-1], request, max_steps=4 * len(points) + 100)
     if end != points[-1].solution.parameter:
@@ -87,9 +88,13 @@ def _extrapolated(
     asked = _asked(request, points)
     family = Family(tuple(rings), request.tolerance)
     points = all_asked(family, request, points, asked)
-    places = list(placed(family, points, asked))
-    order = _order(arc_lengths(rings[0], points), places)
     scales = scales_of(family, points)
+    places = [
+        place if place is None or place.sought else located(family, point, place, scales)
+        for point, place in zip(points, placed(family, points, asked), strict=True)
+    ]
+    points = [marked(family, *one) for one in zip(points, places, strict=True)]
+    order = _order(arc_lengths(rings[0], points), places)
     return _bars(family, _certain(points, order), [places[k] for k in order], scales)
 
 
@@ -121,7 +126,7 @@ def _without_errors(
     where = "cannot be followed to an end" if end is None else f"ends at gamma = {end:.6g}"
     values = columns(rings[0], points)
     how = (
-        f"null, and values not extrapolated: on {_edges(rings[-1])} edges the path {where}, so that"
+        f"null, and values not extrapolated: on {rings[-1].n_edges} edges the path {where}, so that"
         " the meshes are not yet of one kind; use more edges"
     )
     raw = {name: column.tolist() for name, column in values.items()}
@@ -185,7 +190,7 @@ def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:
 
 def _how(rings: Sequence[GrippedRing], bounds: Sequence[Array | None]) -> str:
     """How the errors were computed, in a sentence."""
-    sizes = ", ".join(str(_edges(ring)) for ring in rings)
+    sizes = ", ".join(str(ring.n_edges) for ring in rings)
     text = (
         f"Romberg extrapolation from {sizes} edges, states matched in the planes normal to the path"
         " of the finest; an error is the last correction and an estimate of those to come"
@@ -193,13 +198,7 @@ def _how(rings: Sequence[GrippedRing], bounds: Sequence[Array | None]) -> str:
     missing = sum(bound is None for bound in bounds)
     if missing:
         text += (
-            f"; null at {missing} of {len(bounds)} states: a coarser mesh has no such state, or it"
-            f" is a branch or contact point, whose place on the path is that of {_edges(rings[0])}"
-            " edges"
+            f"; null at {missing} of {len(bounds)} states: a coarser mesh has no such state or"
+            " point"
         )
     return text
-
-
-def _edges(ring: GrippedRing) -> int:
-    """Edges of the full ring."""
-    return len(ring.rod.cell) * ring.copies

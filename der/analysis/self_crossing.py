@@ -22,7 +22,7 @@ from der.problem import Solution
 from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
 
-_CONTACT = 1e-5  # of s, for a crossing: places are found to 2e-6
+CONTACT = 1e-5  # of s, for a crossing: places are found to 2e-6
 _SIDE = 0.45  # of that: how far before and behind a crossing the link is counted
 _BRIEF = 1e-3  # of s, between a crossing and its reversal
 _PLACE = 1e-3  # of s: how well the root is found before the curve is corrected there
@@ -70,7 +70,7 @@ class SelfCrossing:
         """Changes of the link between two places: at roots of the gap, else by bisection."""
         if low[1] == high[1]:
             return []
-        if high[0] - low[0] < _CONTACT:
+        if high[0] - low[0] < CONTACT:
             details = {"linking_before": low[1], "linking_after": high[1]}
             events: Events[State] = Events(stability=self.stability)
             at = step.at(low[0])
@@ -80,7 +80,7 @@ class SelfCrossing:
             s = 0.5 * (low[0] + high[0])
             inside = [(s, self.ring.link(step.near(s)))]
         else:
-            sides = passed - _SIDE * _CONTACT, passed + _SIDE * _CONTACT
+            sides = passed - _SIDE * CONTACT, passed + _SIDE * CONTACT
             inside = [(s, self.ring.link(step.at(s).state)) for s in sides if low[0] < s < high[0]]
         # a change beside the crossing found is bisected: that was no crossing, or not the only one
         return [

@@ -64,6 +64,11 @@ class GrippedRing(RodSystem):
         return {label: count for label, (count, _) in self.symmetry.items()}
 
     @property
+    def n_edges(self) -> int:
+        """Edges of the full ring."""
+        return self.copies * len(self.rod.cell)
+
+    @property
     def length(self) -> float:
         """Length of the full ring."""
         return self.copies * float(self.rod.length.sum())

@@ -10,10 +10,12 @@ import pytest
 import der
 import der.records.path
 from der.analysis.error_bars import ErrorBars, error_bars
+from der.analysis.extrapolation import located
 from der.analysis.extrapolation.curve import GAMMA, Family, Goal, Matched, _found, placed
 from der.analysis.request import Request
 from der.continuation.richardson import romberg
 from der.problem import Point
+from der.records.text.path import lines
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
 from der.scene import meshes
@@ -246,12 +248,19 @@ def test_gamma_is_not_sought_round_a_fold():
     assert _found(Goal(GAMMA, 0.0, direction=-1.0), 0.0, here, 1.0, bend) is None
 
 
-def test_self_crossings_have_no_errors():
-    """They are placed on N edges only: values on the extrapolated curve, errors null."""
-    _, _, bars = solved(4.0, 64, self_crossings=True)
-    at = kinds(bars).index("contact")
-    assert bars.error["gamma"][at] is None
-    assert "contact" in bars.error["how"]
+def test_a_self_crossing_that_depends_on_the_mesh_is_marked(monkeypatch):
+    """A crossing of the polygon that is none of the smooth curve: errors null, and said so."""
+    monkeypatch.setattr(located, "smooth_crossing", lambda *_, **__: None)
+    path = der.fold(der.Scene(der.circle(), der.rectangular_section(4.0), error_bars=True))
+    assert path.contacts
+    for point in path.contacts:
+        assert path.error["gamma"][point.position] is None
+        assert point.details["seen_on"] == "64 edges only"
+    none = len(path.contacts)
+    assert f"null at {none} of" in path.error["how"]
+    told = lines(path)
+    assert sum("seen on 64 edges only" in line for line in told) == none
+    assert any(f"none at {none} of" in line for line in told)
 
 
 def test_how_names_the_meshes():

@@ -120,6 +120,8 @@ class Place:
     bend: Array  # (LEVELS, 3) d rates/ds; zero if the state is no root
     fixed: bool  # whether its place on the path is significant
     sought: bool = True  # whether it is a place of the extrapolated curve; else of N edges
+    own: Array | None = None  # (LEVELS, 3) values of a point located on each mesh by itself
+    unsure: Array | float = 0.0  # (3,) errors of these by other causes than the meshes
 
 
 class Goal(NamedTuple):
@@ -161,13 +163,13 @@ def _placed(
     """The place of a point, to which ``here`` is matched."""
     goal = _goal(point, asked)
     if goal is not None:
-        return _sought(family, point.solution, here, goal)
+        return sought(family, point.solution, here, goal)
     values, bend = romberg(here.table)[-1][:RATE], np.zeros((LEVELS, RATE))
     marked = point.kind != ""
     return Place(0.0, here.table, here.residual, values, np.eye(RATE, 6), bend, marked, not marked)
 
 
-def _sought(family: Family, base: Equilibrium, here: Matched, goal: Goal) -> Place | None:
+def sought(family: Family, base: Equilibrium, here: Matched, goal: Goal) -> Place | None:
     """The place of a goal, by the secant method from ``base``, to which ``here`` is matched."""
     s, now, bend = 0.0, romberg(here.table)[-1], np.zeros((LEVELS, RATE))
     slope = float(now[RATE + goal.column]) if goal.column < RATE else 0.0

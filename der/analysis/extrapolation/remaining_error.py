@@ -43,8 +43,9 @@ class Corrections:
     """The corrections of the two extrapolations at the states of a path."""
 
     places: Sequence[Place | None]
-    last: Array  # (n, 6) T20 - T10; zero if there is no state
-    left: Array  # (n, 6) estimate of all further ones
+    first: Array  # (n, 6) T10 - T00; zero if there is no state
+    last: Array  # (n, 6) T20 - T10
+    ratio: float  # of the last to the first
     exact: NDArray[np.bool_]  # (n,) the same on every mesh, as a folded ring; or no state
 
     @classmethod
@@ -58,7 +59,12 @@ class Corrections:
         seen = most > _EXACT * scales
         ratio = float((then[seen] / most[seen]).max(initial=0.0))
         exact = np.all(np.abs(first[:, :RATE]) < _EXACT * scales[:RATE], axis=1)
-        return cls(places, last, _LEFT * ratio**2 * np.abs(first), exact)
+        return cls(places, first, last, ratio, exact)
+
+    @property
+    def left(self) -> float:
+        """Estimate of all further corrections, as a fraction of the first."""
+        return _LEFT * self.ratio**2
 
     def bound(self, k: int) -> Array | None:
         """Errors (3,) of the values at a place; None: they are not known.
@@ -69,6 +75,11 @@ class Corrections:
         if place is None or not place.sought:
             return None
         floor = 2.0 * place.residual * np.any(place.spread != 0.0, axis=1)
+        if place.own is not None:
+            first, last = np.abs(np.diff(romberg(place.own), axis=0))
+            # it has no neighbours: its last correction counts as large as along the path
+            bound: Array = np.maximum(last, self.ratio * first) + self.left * first
+            return bound + place.unsure + floor
         return self._of(k, place.spread, alone=bool(self.exact[k])) + floor
 
     def _of(self, k: int, spread: Array, *, alone: bool) -> Array:
@@ -79,7 +90,7 @@ class Corrections:
         """
         near = slice(k, k + 1) if alone else slice(max(k - 1, 0), k + 2)
         last = np.abs(self.last[near] @ spread.T).max(axis=0)
-        errors: Array = last + np.abs(spread) @ self.left[k]
+        errors: Array = last + self.left * np.abs(spread) @ np.abs(self.first[k])
         return errors
 
     def slope(self, k: int | None) -> tuple[float | None, float | None]:
