@@ -1,7 +1,8 @@
-"""The benchmark and the stress test, from a clone.
+"""The benchmark, the stress test and the survey of error bars, from a clone.
 
     python -m validation benchmark [--quick] [--only PARTS] [--json F] [--out DIR]
     python -m validation stress [--quick | --long] [--workers N] [--seed N] [--json F]
+    python -m validation error-bars [--count N] [--seed N] [--edges N,...] [--json F]
 
 `der bench` and `der stress` do the same in the folder of a clone.
 """
@@ -9,15 +10,26 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path as File
 
 from der.cli.clone import BenchOptions, StressOptions
 from der.cli.commands import leave
 from der.cli.files import check_named, check_writable, made_folder
 from der.cli.output import show
-from der.cli.parsing import add_command, application, options_named
+from der.cli.parsing import add_command, application, file_option, numbers, option, options_named
 
-app = application("The evidence: benchmark and stress test.")
+app = application("The evidence: benchmark, stress test and survey of error bars.")
+
+
+@dataclass(frozen=True)
+class ErrorBarOptions:
+    """Which rings are judged."""
+
+    count: int = option("Random rings, two of five of them profiles.", 500)
+    seed: int = option("Of the rings.", 0)
+    edges: str = option("Edges of the rods, commas between.", "64,128")
+    json: str | None = file_option("Write everything judged, with the rings of what is outside.")
 
 
 def benchmark(wanted: BenchOptions) -> int:
@@ -52,6 +64,20 @@ def stress(wanted: StressOptions) -> int:
     return 130 if summary.interrupted else 0
 
 
+def error_bars(wanted: ErrorBarOptions) -> int:
+    """Count the error bars that hold the boundary-value problem's values, over random rings."""
+    with options_named():
+        edges = [int(n) for n in numbers("edges", wanted.edges) or ()]
+        file = _writable(wanted.json)
+    from validation.error_bars import saved, survey
+
+    found = survey(wanted.count, wanted.seed, edges)
+    if file is not None:
+        file.write_text(saved(found))
+    show(str(found))
+    return 130 if found.interrupted else 0
+
+
 def _writable(json: str | None) -> File | None:
     """The file of --json, after making sure that it can be written."""
     if json is None:
@@ -60,7 +86,7 @@ def _writable(json: str | None) -> File | None:
     return File(json)
 
 
-for _command in (benchmark, stress):
+for _command in (benchmark, stress, error_bars):
     add_command(app, _command)
 
 if __name__ == "__main__":

@@ -122,7 +122,7 @@ def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {one.name: one.annotation for one in parameters}
     run.__doc__ = function.__doc__
-    app.command(name=function.__name__)(run)
+    app.command(name=function.__name__.replace("_", "-"))(run)
 
 
 def _parameter(one: Field[Any], hint: Any) -> inspect.Parameter:
