@@ -1,9 +1,9 @@
 """Where the frames of a discrete ring sit: close where it is sharply bent, on every joint.
 
-Frames sit on grips, free points and jumps of the natural curvature at every resolution; between
-these, cells share a density equally. It is the mean curvature of the folded ring beside that of the
-flat one: |k1u| + 4 pi/L (paper, Eq. B.1), so that straights, which bend most when the ring folds,
-are resolved like its fillets.
+Frames sit on grips, free points, jumps and kinks of the natural curvature at every resolution;
+between these, cells share a density equally. It is the mean curvature of the folded ring beside
+that of the flat one: |k1u| + 4 pi/L (paper, Eq. B.1), so that straights, which bend most when the
+ring folds, are resolved like its fillets.
 
 Twice as many cells are the same cells halved: where cells of N halve those of N/2, a smooth
 solution's errors have even powers of 1/N. For that, the cells are shared out among the segments at
@@ -23,32 +23,72 @@ from der.geometry.ring import Ring
 
 CLOSE = 1e-12  # of the length: joints nearer to an end than this are that end
 FEW = 1e-3  # of a cell's share: a segment with less has no cell
+SLIGHT = 1e-9  # of the curvature over the length: smaller jumps of its slope are rounding
 SAMPLES = 256  # of the density in a segment whose curvature varies
 
 
-def sites(ring: Ring, n_edges: int, name: str) -> Array:
+def sites(ring: Ring, n_edges: int, name: str, finest: int | None = None) -> Array:
     """Arc lengths of the frames of a sector, both of its ends included.
 
     Parameters
     ----------
     n_edges : edges of the full ring, divisible into the sector (`scene.sector_name`).
     name : "full", "half" or "quarter". The full ring's first frame stands at its end, too.
+    finest : edges of the mesh of which this is a coarser one for error bars; None: it is none.
 
     Notes
     -----
     The sites have the ring's symmetry: those of a half are those of a quarter and their mirror
     image. Where there are fewer cells than segments, jumps of curvature lie inside of cells, which
-    see their mean.
+    see their mean. Kinks lie inside of cells where a quarter of the finest mesh has fewer cells
+    than segments; `natural_turning` makes up for them.
     """
     length = ring.length
+    finest = n_edges if finest is None else finest
     if ring.symmetry == "D2" and n_edges % 4 == 0:
-        quarter = _graded(ring, 0.25 * length, 0.5 * length, n_edges // 4)
+        quarter = _graded(ring, 0.25 * length, 0.5 * length, n_edges // 4, finest // 4)
         half = _mirrored(quarter, 0.5 * length)
     else:
-        half = _graded(ring, 0.0, 0.5 * length, n_edges // 2)
+        half = _graded(ring, 0.0, 0.5 * length, n_edges // 2, finest // 2)
     if name == "half":
         return half
     return quarter if name == "quarter" else np.append(half, (length - half)[-2::-1])
+
+
+def natural_turning(ring: Ring, s: Array) -> Array:
+    """Natural turning (n,) of the cells between frames at the sites ``s`` (n + 1,), rad."""
+    return np.asarray(np.diff(ring.natural_angle(s) + kink_offsets(ring, s)))
+
+
+def kink_offsets(ring: Ring, s: Array) -> Array:
+    """Small turns (n + 1,) of the frames at the sites ``s`` that make up for kinks in cells, rad.
+
+    Notes
+    -----
+    Positions are sums of edges by the trapezoidal rule. The tangent's second derivative jumps by
+    J d2 at a kink, where the slope of k1u jumps by J. With the kink at the fraction t of a cell c,
+    the Euler-Maclaurin formula has one more term there, - J c^3 B3(t)/6 d2, with the Bernoulli
+    polynomial B3(t) = t (t - 1/2)(t - 1). It is zero at nodes; on finer meshes it is of no fixed
+    sign, which would spoil the even series. The two edges beside the kink, turned by this over
+    their lengths, move the rod by that much in every deformed state: what is left is c^4.
+    Frames on a symmetry axis cannot turn, and leave it to the other one.
+    """
+    offsets = np.zeros(len(s))
+    at, jump = _kinks(ring, s[0], s[-1])
+    if not len(at):
+        return offsets
+    cell = np.diff(s)
+    i = np.searchsorted(s, at, side="right") - 1
+    t = (at - s[i]) / cell[i]
+    t[np.minimum(t, 1.0 - t) * cell[i] < CLOSE * ring.length] = 0.0  # a node, but for rounding
+    axes = s / (ring.length * (0.25 if ring.symmetry == "D2" else 0.5))
+    held = np.abs(axes - np.round(axes)) < CLOSE
+    left = np.where(held[i], 0.0, np.where(held[i + 1], 1.0, 1.0 - t))
+    moved = -jump * cell[i] ** 3 * t * (t - 0.5) * (t - 1.0) / 6.0
+    np.add.at(offsets, i, left * moved)
+    np.add.at(offsets, i + 1, (1.0 - left) * moved)
+    length = 0.5 * (np.append(cell, 0.0) + np.append(0.0, cell))
+    return offsets / length
 
 
 def _mirrored(s: Array, end: float) -> Array:
@@ -56,12 +96,9 @@ def _mirrored(s: Array, end: float) -> Array:
     return np.append((end - s)[:0:-1], s)
 
 
-def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
-    """Sites (n_cells + 1,) from ``begin`` to ``end``."""
-    margin = CLOSE * ring.length
-    joints = [begin, *(s for s in ring.breaks if begin + margin < s < end - margin), end]
-    if n_cells < len(joints) - 1:
-        joints = [begin, end]
+def _graded(ring: Ring, begin: float, end: float, n_cells: int, finest: int) -> Array:
+    """Sites (n_cells + 1,) from ``begin`` to ``end``; on the finest mesh, ``finest`` cells."""
+    joints, kinked = _joints(ring, begin, end, n_cells, finest)
     segments = [_segment(ring, a, b) for a, b in pairwise(joints)]
     # a straight that rounding leaves between two fillets has no cell of its own
     least = FEW * sum(segment.weight for segment in segments) / n_cells
@@ -71,15 +108,45 @@ def _graded(ring: Ring, begin: float, end: float, n_cells: int) -> Array:
             kept = kept[:-1]
         joints = [begin, *kept, end]
         segments = [_segment(ring, a, b) for a, b in pairwise(joints)]
-    coarsest = n_cells
-    while coarsest % 2 == 0 and coarsest // 2 >= 2 * len(segments):
+    coarsest, enough = (finest, _quarter(finest)) if kinked else (n_cells, n_cells)
+    while coarsest % 2 == 0 and (coarsest > enough or coarsest // 2 >= 2 * len(segments)):
         coarsest //= 2
     counts = _shared([segment.weight for segment in segments], coarsest)
     places = [
-        segment.places(count * (n_cells // coarsest))[:-1]
+        segment.places(count * n_cells // coarsest)[:-1]
         for segment, count in zip(segments, counts, strict=True)
     ]
     return np.append(np.concatenate(places), end)
+
+
+def _joints(
+    ring: Ring, begin: float, end: float, n_cells: int, finest: int
+) -> tuple[list[float], bool]:
+    """Ends of the segments, and whether kinks are among them: all of them or none."""
+    margin = CLOSE * ring.length
+    joints = [begin, *(s for s in ring.breaks if begin + margin < s < end - margin), end]
+    if n_cells < len(joints) - 1:
+        joints = [begin, end]
+    at, _ = _kinks(ring, begin + margin, end - margin)
+    apart = [s for s in at.tolist() if min(abs(s - joint) for joint in joints) > margin]
+    if not 0 < len(apart) <= _quarter(finest) - (len(joints) - 1):
+        return joints, False
+    return sorted([*joints, *apart]), True
+
+
+def _quarter(finest: int) -> int:
+    """Cells of the coarsest mesh that error bars need; a mesh that cannot be halved has none."""
+    return finest // 4 if finest % 4 == 0 else finest
+
+
+def _kinks(ring: Ring, begin: float, end: float) -> tuple[Array, Array]:
+    """Arc lengths between two others at which the curvature has a kink, and its jumps of slope."""
+    at, jump = np.array(ring.kinks), ring.outline.slope_jumps
+    if not np.any(jump):
+        return np.zeros(0), np.zeros(0)
+    slight = SLIGHT * np.abs(ring.curvature(at)).max() / ring.length
+    kept = (at > begin) & (at < end) & (np.abs(jump) > slight)
+    return at[kept], jump[kept]
 
 
 class _Segment:

@@ -71,6 +71,12 @@ class PiecewiseLinear:
         """Arc lengths of all knots."""
         return tuple(self.knots[1:-1].tolist())
 
+    @property
+    def slope_jumps(self) -> Array:
+        """Jumps of the curvature's slope at the knots of `kinks`, units of 1/a^3."""
+        slope = (self.curvature_end - self.curvature_start) / np.diff(self.knots)
+        return np.diff(slope)
+
     def angle(self, s: Array) -> Array:
         """Tangent angle at `s`, exactly."""
         i, u, slope = self._locate(s)
@@ -154,6 +160,7 @@ class Ellipse:
     along: float  # semi-axis along the second
     breaks: ClassVar[tuple[float, ...]] = ()  # its curvature is analytic
     kinks: ClassVar[tuple[float, ...]] = ()
+    slope_jumps: ClassVar[Array] = np.zeros(0)
 
     @cached_property
     def length(self) -> float:

@@ -8,7 +8,7 @@ and its length, and slides along E3. Half-turns that map a twisted ring onto its
     about E2   swaps the grips,  s -> L/2 - s         (D2: circle, ellipse, rectangle)
 
 so that the ring is made of 2 halves (grip to grip) or 4 quarters (free point to grip). Grips, free
-points and jumps of curvature hold a frame at every resolution (`sites`).
+points, jumps and kinks of curvature hold a frame at every resolution (`sites`).
 
 The clamped grips join the arms through the grip distance alone. Hence the modes of the full ring:
 
@@ -26,7 +26,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from der.geometry.mesh import sites
+from der.geometry.mesh import kink_offsets, natural_turning, sites
 from der.geometry.ring import Ring
 from der.geometry.section import Section
 from der.kernels.linking import link, unfold, unfold_lengths, vertices
@@ -147,6 +147,7 @@ def gripped_ring(
     name: str = "auto",
     measure: str = "logarithm",
     stretching: float = 0.0,
+    finest: int | None = None,
 ) -> GrippedRing:
     """Return a sector of a gripped ring with ``n_edges`` edges in the full ring.
 
@@ -154,6 +155,7 @@ def gripped_ring(
     ----------
     name : "full", "half" (one arm), "quarter" (D2 rings), or "auto", the smallest possible.
     stretching : EA in GJ/a^2; 0 for an inextensible ring.
+    finest : edges of the mesh of which this is a coarser one, see `sites`.
 
     Raises
     ------
@@ -161,18 +163,19 @@ def gripped_ring(
         If ``n_edges`` is not divisible, or the ring lacks the symmetry.
     """
     name = sector_name(ring, name, n_edges)
-    joints = sites(ring, n_edges, name)
+    joints = sites(ring, n_edges, name, finest)
     closed = name == "full"
     s = joints[:-1] if closed else joints
     rod = discrete_rod(
         np.diff(joints),
-        np.diff(ring.natural_angle(joints)),
+        natural_turning(ring, joints),
         (section.alpha, section.beta, 1.0),
         stretching=stretching,
         measure=measure,
         closed=closed,
     )
-    angle = 0.5 * (ring.angle(s) - 0.5 * np.pi)  # half the turn about E1 from d3 = E3
+    turned = ring.angle(s) + kink_offsets(ring, joints)[: len(s)]
+    angle = 0.5 * (turned - 0.5 * np.pi)  # half the turn about E1 from d3 = E3
     quat = np.stack([np.cos(angle), np.sin(angle), 0.0 * s, 0.0 * s], axis=1)
     supports, classes = {"full": _full, "half": _half, "quarter": _quarter}[name](rod)
     start = State(quat, np.zeros(len(s)), np.zeros(len(supports.target)), 0.0)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from der.continuation.roots import find_root
-from der.geometry.mesh import sites
+from der.geometry.mesh import natural_turning, sites
 from der.geometry.ring import Ring
 from der.kernels.planar import Array, PlanarRod
 from der.records.configurations import Shapes
@@ -123,9 +123,9 @@ def chord_weights(cell: Array, length: Array, end: int) -> Array:
 def planar_ring(scene: Scene, n_edges: int | None = None) -> PlanarRing:
     """The ring of a scene on its mesh, or on a coarser one."""
     n = scene.n_edges if n_edges is None else n_edges
-    places = sites(scene.ring, n, "full")
+    places = sites(scene.ring, n, "full", scene.n_edges)
     cell = np.diff(places)
-    rest = np.diff(scene.ring.natural_angle(places))
+    rest = natural_turning(scene.ring, places)
     length = 0.5 * (cell + np.roll(cell, 1))
     return PlanarRing(scene.ring, places, cell, length, rest)
 

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from shapes import egg
+from shapes import egg, kinked, through_points
 
 import der
-from der.geometry.mesh import sites
+from der.continuation.richardson import romberg
+from der.geometry.mesh import kink_offsets, natural_turning, sites
 
 RINGS = {
     "circle": der.circle(),
@@ -22,6 +23,7 @@ RINGS = {
     "triangle 90": der.triangle(math.pi / 2, 1 / 30),
     "triangle 120": der.triangle(2 * math.pi / 3, 1 / 15),
     "profile": egg(),
+    "kinks": kinked(),
 }
 SECTORS = {"full": 1, "half": 2, "quarter": 4}
 PIECES = [
@@ -35,9 +37,9 @@ EVERY_PIECE = pytest.mark.parametrize(("shape", "name"), PIECES)
 
 
 def joints(ring: der.Ring) -> list[float]:
-    """Return grips, free points and jumps of curvature, from 0 to the ring's length."""
+    """Return grips, free points, jumps and kinks of curvature, from 0 to the ring's length."""
     length = ring.length
-    own = [0.0, 0.5 * length, length, *ring.breaks]
+    own = [0.0, 0.5 * length, length, *ring.kinks]
     if ring.symmetry == "D2":
         own += [0.25 * length, 0.75 * length]
     return sorted(own)
@@ -58,10 +60,9 @@ def test_a_sector_has_its_share_of_the_cells_and_both_ends(shape, name, n_edges)
 @EVERY_RING
 @pytest.mark.parametrize("n_edges", [32, 52, 64, 128, 256])
 def test_a_frame_sits_on_every_joint(shape, n_edges):
-    """Grips, free points and jumps of the natural curvature, at every resolution, to rounding.
+    """Grips, free points, jumps and kinks of the natural curvature, to rounding.
 
-    The user's profile has a knot for each point: where there are more knots than cells, jumps lie
-    inside of cells, which see their mean.
+    The user's profile has eight knots for each point: more than cells, so that they lie inside.
     """
     ring = RINGS[shape]
     s = sites(ring, n_edges, "full")
@@ -74,18 +75,18 @@ def test_a_frame_sits_on_every_joint(shape, n_edges):
 
 @pytest.mark.parametrize(
     ("shape", "name", "n_edges"),
-    [(*piece, n) for piece in PIECES for n in (128, 256, 512) if piece[0] != "profile" or n == 512],
+    [(*piece, n) for piece in PIECES for n in (128, 256, 512)],
 )
 def test_twice_as_many_cells_are_the_same_cells_halved(shape, name, n_edges):
     """Every second site of N is a site of N/2, every fourth one of N/4: errors in even powers.
 
-    From two cells a segment at N/4 on, which 128 edges have on every shape; the user's profile has
-    24 segments in half of its ring. Positions agree to rounding.
+    From two cells a segment at N/4 on, which 128 edges have on every shape. Positions agree to
+    rounding.
     """
     ring = RINGS[shape]
     fine = sites(ring, n_edges, name)
     for factor in (2, 4):
-        coarse = sites(ring, n_edges // factor, name)
+        coarse = sites(ring, n_edges // factor, name, finest=n_edges)
         assert_allclose(fine[::factor], coarse, rtol=0, atol=1e-13 * ring.length)
 
 
@@ -159,3 +160,49 @@ def test_natural_turning_of_all_cells_is_one_turn(shape):
     for n_edges in (16, 64):
         turning = np.diff(ring.natural_angle(sites(ring, n_edges, "half"))).sum()
         assert turning == pytest.approx(math.pi, abs=1e-12)
+
+
+@pytest.mark.parametrize("n_edges", [32, 64])
+def test_meshes_of_error_bars_are_nested_where_cells_are_few(n_edges):
+    """Two segments in a quarter of the ring, and N/4 edges have two cells for them, or four."""
+    ring = RINGS["kinks"]
+    fine = sites(ring, n_edges, "quarter")
+    for factor in (2, 4):
+        coarse = sites(ring, n_edges // factor, "quarter", finest=n_edges)
+        assert_allclose(fine[::factor], coarse, rtol=0, atol=1e-14)
+
+
+def test_knots_on_a_line_are_no_kinks():
+    """A circle of 32 knots has the mesh and the natural turning of the circle."""
+    s = np.linspace(0.0, 2.0 * math.pi, 33)
+    ring = der.profile(s, np.ones(33))
+    found = sites(ring, 64, "half")
+    assert_allclose(found, sites(der.circle(), 64, "half"), atol=1e-13)
+    assert_array_equal(natural_turning(ring, found), np.diff(ring.natural_angle(found)))
+
+
+def chord(ring: der.Ring, n_edges: int, *, plain: bool) -> float:
+    """Return the distance between the grips as a sum of edges, less the exact one."""
+    s = sites(ring, n_edges, "half")
+    angle = ring.natural_angle(s) + (0.0 if plain else kink_offsets(ring, s))
+    cell = np.append(0.0, np.diff(s))
+    length = 0.5 * (cell + np.roll(cell, -1))
+    exact = ring.position(0.5 * ring.length)[2] - ring.position(0.0)[2]
+    return float(length @ np.sin(angle) - exact)
+
+
+def test_turned_frames_make_up_for_kinks_inside_of_cells():
+    """95 knots: what is left of the chord's error after two extrapolations, over nine meshes.
+
+    Without the small turns of the frames it is of third order and of no fixed sign; with them it is
+    of fourth order, and ten times smaller.
+    """
+    ring = through_points(12, lambda theta: 1.0 + 0.1 * np.cos(3.0 * theta))
+
+    def left(*, plain: bool) -> float:
+        tables = [
+            [chord(ring, n // k, plain=plain) for k in (1, 2, 4)] for n in range(128, 257, 16)
+        ]
+        return float(np.linalg.norm(romberg(np.transpose(tables))[2]))
+
+    assert left(plain=False) < 0.1 * left(plain=True)

@@ -35,9 +35,8 @@ def packing_ratio(mesh: PlanarRing, phi: Array, turning: int) -> tuple[float, fl
 def curve(mesh: PlanarRing, phi: Array, turning: int) -> Array:
     """Points (n, 2) along the curve whose tangents at the frames are ``phi`` (N,)."""
     length = mesh.ring.length
-    ends = mesh.ring.natural_angle(mesh.places) - mesh.ring.natural_angle(0.0)
-    uniform = (2.0 * np.pi * turning - ends[-1]) / length
-    change = phi - ends[:-1] - uniform * mesh.places[:-1]
+    uniform = (2.0 * np.pi * turning - float(mesh.rest.sum())) / length
+    change = phi - mesh.natural - uniform * mesh.places[:-1]
     spline = CubicSpline(mesh.places, np.append(change, change[0]), bc_type="periodic")
     s = _along(mesh)
     step = np.diff(s)[:, None]
