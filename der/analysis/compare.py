@@ -4,7 +4,8 @@ A state of the rod has errors in gamma, M and U. It is compared by its normal di
 curve of the boundary-value problem, in (gamma/pi, M/max|M|) and in (gamma/pi, U/max U), so states
 need not be matched. The curve is solved for at every gamma of the rod's states, with exact slopes
 (dM/dgamma from the linearised problem, dU/dgamma = 4 M). The distance is that from a tangent,
-without interpolation. Folds and limits are compared one by one.
+without interpolation. A state beside a fold may lie beyond the last gamma of the curve: it is
+compared with the tangent at the fold. Folds and limits are compared one by one.
 """
 
 from __future__ import annotations
@@ -66,11 +67,10 @@ def compare(
     bvp, points = solve_with_points(wanted, tolerance=tolerance, progress=progress)
     scales = {name: float(np.abs(getattr(bvp, name)).max()) for name in ("moment", "energy")}
     folds = {point.position for point in rod.folds}
-    regular = [point for point in points if point.kind != "fold"]
     states = [
         found
         for k in range(len(rod))
-        if k not in folds and (found := _state(rod, k, regular, scales, tolerance)) is not None
+        if k not in folds and (found := _state(rod, k, points, scales, tolerance)) is not None
     ]
     pairs, alone = _pairs(rod, bvp)
     missing = len(rod) - len(rod.folds) - len(states)
@@ -84,18 +84,21 @@ def _last(scene: Scene) -> float:
 def _state(
     rod: Path, k: int, points: Sequence[Point], scales: Mapping[str, float], tolerance: float
 ) -> ComparedState | None:
-    """State k of the rod, and the solution at its gamma that is nearest in M and U."""
+    """State k of the rod, and the nearest solution: at its gamma, or a fold."""
     gamma = float(rod.gamma[k])
     values = {name: float(getattr(rod, name)[k]) for name in scales}
 
     def apart(point: Point) -> float:
         others = {name: getattr(point.solution, name) for name in scales}
-        return math.hypot(*((others[n] - values[n]) / scales[n] for n in scales))
+        away = (point.solution.gamma - gamma) / math.pi
+        return math.hypot(away, *((others[n] - values[n]) / scales[n] for n in scales))
 
-    here = [point for point in points if abs(point.solution.gamma - gamma) < SAME]
+    here = [one for one in points if one.kind == "fold" or abs(one.solution.gamma - gamma) < SAME]
     if not here:
         return None
     point, errors = min(here, key=apart), _errors(rod, k)
+    if point.kind == "fold" and apart(point) > FAR:
+        return None
     kinds = {special.position: special.kind for special in rod.points}
     entries: dict[str, Any] = {"gamma": gamma, "kind": kinds.get(k, "")}
     for name, scale in scales.items():

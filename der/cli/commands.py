@@ -2,6 +2,7 @@
 
 Exit codes: 0 done; 2 bad input, in one line that names the option, the value and what is allowed;
 3 not converged, 130 stopped by Ctrl-C: the path up to its last good state is saved and named.
+`compare` also ends with 3 where less than 90 % of the states are inside their error bars.
 """
 
 from __future__ import annotations

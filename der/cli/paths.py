@@ -77,4 +77,5 @@ def compare(ring: RingOptions, path: PathOptions, files: ComparisonFiles) -> int
         return der.compare(scene, progress=tick)
 
     # the files named are for a comparison: an unfinished path goes to a file of its own
-    return run(solve, written, bar=over_gamma(scene), partial={}, quiet=files.quiet)[1]
+    found, code = run(solve, written, bar=over_gamma(scene), partial={}, quiet=files.quiet)
+    return max(code, 3) if getattr(found, "disagrees", False) else code

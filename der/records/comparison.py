@@ -13,6 +13,8 @@ from der.records.path import Path
 from der.records.record import Record
 from der.records.values import Count, Number, Text
 
+AGREED = 0.9  # share of the states inside their error bars, below which the two disagree
+
 
 @dataclass(frozen=True)
 class ComparedState(Checked):
@@ -105,6 +107,11 @@ class Comparison(Record, name="comparison", plot="comparison"):
         """Share of the states with error bars that agree within them; NaN where there are none."""
         known = [state.agrees for state in self.states if state.agrees is not None]
         return sum(known) / len(known) if known else math.nan
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether too few states agree within their error bars; False where there are none."""
+        return self.within < AGREED
 
     @property
     def largest(self) -> tuple[float, float]:

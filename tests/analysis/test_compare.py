@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shapes import KINKS
 
 import der
 from der.analysis.compare import compare
@@ -57,6 +58,7 @@ def test_a_wrong_rod_is_found_out(scene, rod):
     assert 2e-4 < wrong.largest[0] < 1.1e-3
     assert wrong.within < 0.2
     assert "beyond" in summary(wrong)
+    assert "The two solvers disagree: less than 90 % of the states are inside" in summary(wrong)
 
 
 def test_a_fold_too_many_has_no_counterpart(scene, rod):
@@ -106,3 +108,40 @@ def test_compare_writes_table_picture_and_data(tmp_path, capsys):
     assert np.isfinite([state["moment_distance"] for state in entries["states"]]).all()
     assert (tmp_path / "new" / "comparison.png").read_bytes().startswith(b"\x89PNG")
     assert "agree within their error bars" in capsys.readouterr().out
+
+
+def test_compare_ends_with_3_where_the_two_disagree(tmp_path, capsys, monkeypatch, comparison):
+    """The record is written all the same; with --quiet, too, and at 90 % the code is 0."""
+    rod = comparison.rod
+    wrong = replace(rod, moment=1.001 * rod.moment)
+    monkeypatch.setattr("der.analysis.fold.fold", lambda scene, progress=None: wrong)
+    words = ("compare", "circle", "--h-over-t", "1.6", "--edges", "128")
+    assert run(*words, "--json", str(tmp_path / "c.json")) == 3
+    assert "The two solvers disagree" in capsys.readouterr().out
+    assert json.loads((tmp_path / "c.json").read_text())["within"] < 0.9
+    assert run(*words, "--quiet") == 3
+
+
+def test_compare_of_a_kinked_profile(tmp_path, capsys):
+    """All states are inside at 128 edges; they were 27 % with kinks inside of cells."""
+    file = tmp_path / "kink.csv"
+    rows = [("arc_length", "curvature"), *KINKS]
+    file.write_text("".join(f"{s},{k}\n" for s, k in rows))
+    words = ("compare", "profile", str(file), "--h-over-t", "4", "--edges", "128")
+    assert run(*words, "--no-stability") == 0
+    assert "100.0 % of the states agree within their error bars" in capsys.readouterr().out
+
+
+def test_a_state_beyond_the_last_gamma_is_held_against_the_fold(scene, rod):
+    """A state moved half a bar beyond a fold: it agrees, and has a counterpart."""
+    fold = rod.folds[0]
+    k = fold.position - 1
+    gamma = rod.gamma.copy()
+    moment, energy = rod.moment.copy(), rod.energy.copy()
+    away = math.copysign(0.5 * rod.error["gamma"][fold.position], gamma[fold.position] - gamma[k])
+    gamma[k] = fold.gamma + away
+    moment[k], energy[k] = fold.moment + 1e-7, fold.energy
+    found = compare(scene, replace(rod, gamma=gamma, moment=moment, energy=energy))
+    (state,) = [one for one in found.states if one.gamma == gamma[k]]
+    assert state.agrees
+    assert found.unmatched == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from der.records.comparison import Comparison
+from der.records.comparison import AGREED, Comparison
 from der.records.text.path import ONE_ARM
 from der.records.text.table import form, table
 from der.records.units import unit
@@ -42,6 +42,11 @@ def lines(found: Comparison) -> list[str]:
     )
     if not math.isnan(found.within):
         told.append(f"{100 * found.within:.1f} % of the states agree within their error bars")
+    if found.disagrees:
+        told.append(
+            f"The two solvers disagree: less than {100 * AGREED:.0f} % of the states are inside "
+            "their error bars. Use more edges."
+        )
     if found.unmatched:
         told.append(f"{found.unmatched} states or special points have no counterpart")
     return told
