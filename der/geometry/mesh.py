@@ -24,6 +24,7 @@ from der.geometry.ring import Ring
 CLOSE = 1e-12  # of the length: joints nearer to an end than this are that end
 FEW = 1e-3  # of a cell's share: a segment with less has no cell
 SLIGHT = 1e-9  # of the curvature over the length: smaller jumps of its slope are rounding
+STRONG = 0.1  # of the strongest kink: weaker ones may lie inside of cells
 SAMPLES = 256  # of the density in a segment whose curvature varies
 
 
@@ -40,8 +41,8 @@ def sites(ring: Ring, n_edges: int, name: str, finest: int | None = None) -> Arr
     -----
     The sites have the ring's symmetry: those of a half are those of a quarter and their mirror
     image. Where there are fewer cells than segments, jumps of curvature lie inside of cells, which
-    see their mean. Kinks lie inside of cells where a quarter of the finest mesh has fewer cells
-    than segments; `natural_turning` makes up for them.
+    see their mean. Where there are more kinks than cells of N/4 edges, weak ones lie inside of
+    cells, or all of them; `natural_turning` makes up for that.
     """
     length = ring.length
     finest = n_edges if finest is None else finest
@@ -122,16 +123,19 @@ def _graded(ring: Ring, begin: float, end: float, n_cells: int, finest: int) -> 
 def _joints(
     ring: Ring, begin: float, end: float, n_cells: int, finest: int
 ) -> tuple[list[float], bool]:
-    """Ends of the segments, and whether kinks are among them: all of them or none."""
+    """Ends of the segments, and whether kinks are among them: all, the strong ones, or none."""
     margin = CLOSE * ring.length
     joints = [begin, *(s for s in ring.breaks if begin + margin < s < end - margin), end]
     if n_cells < len(joints) - 1:
         joints = [begin, end]
-    at, _ = _kinks(ring, begin + margin, end - margin)
-    apart = [s for s in at.tolist() if min(abs(s - joint) for joint in joints) > margin]
-    if not 0 < len(apart) <= _quarter(finest) - (len(joints) - 1):
-        return joints, False
-    return sorted([*joints, *apart]), True
+    at, jump = _kinks(ring, begin + margin, end - margin)
+    size = np.abs(jump)
+    size[np.isin(at, joints)] = 0.0
+    for share in (0.0, STRONG):
+        strong = at[size > share * size.max(initial=0.0)].tolist()
+        if 0 < len(strong) <= _quarter(finest) - (len(joints) - 1):
+            return sorted([*joints, *strong]), True
+    return joints, False
 
 
 def _quarter(finest: int) -> int:

@@ -64,3 +64,15 @@ def test_error_bars_of_rings_through_points_hold(name, n_edges):
     found = compare(scene(RINGS[name], 4.0, **wants))
     assert found.within >= 0.95
     assert all(pair.difference <= pair.bar for pair in found.pairs)
+
+
+@pytest.mark.parametrize("n_edges", [128, 256])
+@pytest.mark.parametrize("name", RINGS)
+def test_a_kinked_ring_in_its_plane(name, n_edges):
+    """The force at a distance of 0.6 and the packing ratio lie within their error bars."""
+    statement = scene(RINGS[name], 4.0, n_edges=n_edges, error_bars=True)
+    path = der.squeeze(statement, 0.6)
+    assert abs(path.force[-1] - FORCES[name]) <= path.force_error[-1] + 1e-8
+    shapes = [state for state in der.planar(statement).states if state.turning == 3]
+    right = der.packing_ratio(RINGS[name])
+    assert min(abs(one.packing - right) - one.packing_error for one in shapes) <= 1e-8
