@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from typing import Any, Generic
 
 from der.continuation.events import Events, located, regular
-from der.continuation.step import Step
+from der.continuation.step import Step, between
 from der.errors import ContinuationFailed, Reason
 from der.problem import PLANE, Increment, Options, Point, S, Solution, Statistics, System
 
-_STRAIGHT = 0.01  # bulge of a step that is accepted although its ends have unequal orientation
+_STRAIGHT = 0.01  # bulge of a piece of a step that may have a branch point within it
 _EASY = 4  # Newton iterations; a step that takes more is followed by a shorter one
 
 
@@ -134,12 +134,41 @@ class _Path(Generic[S]):
                 reason = Reason.TOO_SHARP
                 if self._angle(start, end) < options.sharpest_turn:
                     step = Step(self.system, start, end, length, options.tolerance, self.statistics)
-                    if _orientation(start) == _orientation(end) or step.bulge < _STRAIGHT:
+                    if self._one_curve(step):
                         return step
                     reason = Reason.OTHER_BRANCH
             length *= 0.5
         advice = reason.value if end.converged else end.advice
         raise ContinuationFailed(f"no step forward from {self._place(start)}: {advice}", reason)
+
+    def _one_curve(self, step: Step[S]) -> bool:
+        """Whether the ends of a step lie on one branch.
+
+        Where their orientations differ, the change is bisected on the step's curve, until the piece
+        around it is straight. A step that leads to another branch has a corner there.
+        """
+        low, high = (0.0, step.start), (step.length, step.end)
+        piece = step
+        while _orientation(low[1]) != _orientation(high[1]) and piece.bulge >= _STRAIGHT:
+            s = 0.5 * (low[0] + high[0])
+            if high[0] - low[0] < self.options.smallest_step:
+                return False
+            try:
+                middle = s, step.at(s)
+            except ContinuationFailed:
+                return False
+            if _orientation(middle[1]) == _orientation(low[1]):
+                low = middle
+            else:
+                high = middle
+            piece = between(
+                self.system,
+                low[1],
+                high[1],
+                tolerance=self.options.tolerance,
+                statistics=self.statistics,
+            )
+        return True
 
     def _place(self, at: Solution[S]) -> str:
         return f"{self.system.parameter_name} = {at.parameter:.8f}"
