@@ -116,7 +116,7 @@ def _points(
     if scene.solver == "relaxation":
         from der.analysis.loading_by_relaxation import follow_relaxed
 
-        # no Hessian anywhere: neither index nor link is looked for between states
+        # no Hessian between states: neither branch points nor links are looked for
         bare = replace(request, stability=False, self_crossings=False)
         return follow_relaxed(ring, bare, statistics, unload=scene.unload, every=every)
     if scene.control == "arclength":

@@ -5,16 +5,18 @@ The ring follows its path of equilibria from minimum to minimum until stability 
     angle   at a fold, dgamma/ds = 0, or where the index changes (a branch point)
     moment  at a limit of the moment, dM/ds = 0, or at a branch point
 
-Then it snaps (`snap`), and loading continues from the end state of the snap.
+Then it snaps (`snap`), and loading continues from the end state of the snap. A start that is no
+minimum snaps at once. What decides is the index of the full ring, under the control in use: with
+the moment held there is one more unstable mode, which keeps the symmetry, where dM/dgamma < 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from der.analysis.request import Request
-from der.analysis.snap import Snap, downhill
+from der.analysis.snap import Landing, Snap, check_symmetry, downhill
 from der.continuation.step import between
 from der.errors import ContinuationFailed, Reason
 from der.problem import PARAMETER, Point, Statistics
@@ -45,12 +47,9 @@ def follow_angle(
     ContinuationFailed
         If loading cannot continue, after all points found have been yielded.
     """
-    loading = _Loading(ring, request, statistics, PARAMETER, every)
-    last = yield from loading.from_state(ring.start if start is None else start)
-    if unload:
-        back = replace(loading, request=replace(request, gamma_max=0.0)).from_state(last)
-        next(back)  # the state at which loading has ended
-        yield from back
+    loading = _Loading(ring, replace(request, stability=True), statistics, PARAMETER, every)
+    points = loading.there_and_back(ring.start if start is None else start, unload=unload)
+    yield from _as_asked(points, request)
 
 
 def follow_moment(
@@ -73,23 +72,17 @@ def follow_moment(
     ContinuationFailed
         If loading cannot continue, after all points found have been yielded.
     """
-    loading = _Loading(ring, request, statistics, "moment", every)
-    last = yield from loading.from_state(ring.start)
-    if not unload:
-        return
-    down = replace(loading, request=replace(request, gamma_max=0.0))
-    at = down.begun(last)
-    if at.slope < 0.0:
-        # M grows as gamma decreases: no dead moment holds the ring once it has left the stop
-        landed = down.snap(at, -1.0).landing(at.tangent, dead_moment=True)
-        yield landed
-        down.check_other_classes(landed)
-        if landed.solution.parameter == 0.0:
-            return
-        last = landed.solution.state
-    back = down.from_state(last)
-    next(back)  # the state that was yielded last
-    yield from back
+    asked = replace(request, stability=True, limits=True)
+    loading = _Loading(ring, asked, statistics, "moment", every)
+    yield from _as_asked(loading.there_and_back(ring.start, unload=unload), request)
+
+
+def _as_asked(
+    points: Iterable[Point[Equilibrium]], request: Request
+) -> Iterator[Point[Equilibrium]]:
+    """The points, with the index only if that is wanted."""
+    for one in points:
+        yield one if request.stability else replace(one, index=None, sides=None, stiffness=())
 
 
 @dataclass(frozen=True)
@@ -108,9 +101,22 @@ class _Loading:
         return "fold" if self.hold == PARAMETER else "limit"
 
     @property
+    def dead_moment(self) -> bool:
+        """Whether gamma moves in a snap."""
+        return self.hold != PARAMETER
+
+    @property
     def own_class(self) -> str:
         """Name of the modes that the sector itself can follow."""
         return next(iter(self.ring.classes))
+
+    def there_and_back(self, start: State, *, unload: bool) -> Iterator[Point[Equilibrium]]:
+        """Yield the minima from a state to the end, and back to gamma = 0 if asked for."""
+        last = yield from self.from_state(start)
+        if unload:
+            back = replace(self, request=replace(self.request, gamma_max=0.0)).from_state(last)
+            next(back)  # the state at which loading has ended
+            yield from back
 
     def sense(self, state: State) -> float:
         """1 for loading from a state, -1 for unloading."""
@@ -124,7 +130,7 @@ class _Loading:
         return at
 
     def begun(self, state: State) -> Equilibrium:
-        """The minimum from which loading starts, its tangent in the direction of loading.
+        """The equilibrium from which loading starts, its tangent in the direction of loading.
 
         Raises
         ------
@@ -132,13 +138,9 @@ class _Loading:
             If there is none.
         """
         at = self.corrected(state, self.sense(state))
-        place = f"gamma = {state.load:.8f}"
         if not at.converged:
+            place = f"gamma = {state.load:.8f}"
             raise ContinuationFailed(f"{place} is no equilibrium: {at.advice}", Reason.NO_START)
-        if at.index != 0:
-            raise ContinuationFailed(
-                f"the state at {place} is no minimum: loading cannot start from it", Reason.NO_START
-            )
         return at
 
     def from_state(self, start: State) -> Generator[Point[Equilibrium], None, State]:
@@ -147,37 +149,28 @@ class _Loading:
         while True:
             at = self.begun(start if here is None else here.solution.state)
             sense = self.sense(at.state)
-            path = self._path(at.state, sense)
+            along = self.ring.increment(load=sense)
+            path = self.request.follow(self.ring, self.statistics, start=at.state, along=along)
             regular = point = next(path)
             if here is None:
                 yield point
-            for one in path:
+            check_symmetry(self.ring, point.solution, point.index)
+            here = None if self.is_minimum(point) else self._at_once(point, sense)
+            for one in path if here is None else ():
                 point = self._named(one)
                 yield point
                 if point.kind in (self.ends_at, "branch"):
+                    here = self._after(point, self._past(regular, point, path, sense), sense)
                     break
-                regular = point if not point.kind else regular
-            else:
+                if not point.kind:
+                    self.check_minimum(point)
+                    regular = point
+            if here is None:
                 return point.solution.state
-            here = self._after(point, self._past(regular, point, path, sense), sense)
             yield here
-            self.check_other_classes(here)
+            check_symmetry(self.ring, here.solution, here.index)
             if here.solution.parameter == self.request.gamma_max:
                 return here.solution.state
-
-    def _path(self, start: State, sense: float) -> Iterator[Point[Equilibrium]]:
-        """The path of equilibria from a minimum.
-
-        The index in the sector's own class is always counted, because it tells where the ring
-        snaps. The points have it only if it was asked for.
-        """
-        along = self.ring.increment(load=sense)
-        if self.request.stability:
-            yield from self.request.follow(self.ring, self.statistics, start=start, along=along)
-            return
-        asked = replace(self.request, stability=True)
-        for one in asked.follow(self.ring.own_class(), self.statistics, start=start, along=along):
-            yield replace(one, index=None, sides=None)
 
     def _named(self, one: Point[Equilibrium]) -> Point[Equilibrium]:
         """A point; a fold of a branch that returns to its symmetric path is a branch point.
@@ -193,6 +186,13 @@ class _Loading:
         """The snap from a state."""
         return Snap(self.ring, self.request, self.statistics, before, sense, self.every)
 
+    def _at_once(self, start: Point[Equilibrium], sense: float) -> Landing:
+        """The end state of the snap from a start that is no minimum."""
+        at = start.solution
+        own = start.index is not None and start.index[0]
+        mode = downhill(self.ring, at) if own else at.tangent
+        return self.snap(at, sense).landing(mode, dead_moment=self.dead_moment)
+
     def _after(
         self, lost: Point[Equilibrium], past: Callable[[], Equilibrium], sense: float
     ) -> Point[Equilibrium]:
@@ -200,8 +200,7 @@ class _Loading:
         at, symmetry = lost.solution, lost.details.get("symmetry")
         if lost.kind == self.ends_at:
             # the tangent is the softest mode itself, and past the fold is downhill
-            dead = self.hold != PARAMETER
-            return self.snap(at, sense).landing(at.tangent, dead_moment=dead)
+            return self.snap(at, sense).landing(at.tangent, dead_moment=self.dead_moment)
         if symmetry != self.own_class:
             raise ContinuationFailed(
                 f"the ring loses stability at gamma = {at.parameter:.8f} by a mode ({symmetry})"
@@ -214,7 +213,9 @@ class _Loading:
                 return kept
         before = past()
         mode = downhill(self.ring, before)
-        return self.snap(before, sense).landing(mode, gamma_lost=at.parameter)
+        return self.snap(before, sense).landing(
+            mode, dead_moment=self.dead_moment, gamma_lost=at.parameter
+        )
 
     def _past(
         self,
@@ -258,13 +259,16 @@ class _Loading:
             self.request.point(self.ring, found) if found.converged and found.index == 0 else None
         )
 
-    def check_other_classes(self, landed: Point[Equilibrium]) -> None:
-        """Raise an error if a state is unstable in a class that the sector cannot follow."""
-        for label, count in zip(self.ring.classes, landed.index or (), strict=False):
-            if count:
-                raise ContinuationFailed(
-                    f"the ring comes to rest at gamma = {landed.solution.parameter:.8f} in a state"
-                    f" that is unstable to modes ({label}) that break the symmetry of its"
-                    f" {self.ring.name}; the sector 'full' follows it",
-                    Reason.BREAKS_SYMMETRY,
-                )
+    def is_minimum(self, point: Point[Equilibrium]) -> bool:
+        """Whether a state is stable under the control, as far as its index is known."""
+        falls = self.dead_moment and point.solution.slope < 0.0
+        return not falls and not any(point.index or ())
+
+    def check_minimum(self, point: Point[Equilibrium]) -> None:
+        """Raise an error if a state is unstable though no loss of stability was found before it."""
+        if not self.is_minimum(point):
+            raise ContinuationFailed(
+                f"the state at gamma = {point.solution.parameter:.8f} is no minimum, and where"
+                " stability was lost is not known",
+                Reason.NO_MINIMUM,
+            )

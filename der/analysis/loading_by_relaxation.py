@@ -1,4 +1,4 @@
-"""Loading by dynamic relaxation alone, without Hessian and factorisation.
+"""Loading by dynamic relaxation alone: states are found without Hessian and factorisation.
 
 The grips turn in steps. After each step the ring relaxes from the extrapolation of the last states.
 If the end state is far from the extrapolation, the ring has snapped. It has also snapped if its
@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from der.analysis.request import EIGHTH, Request
 from der.analysis.secant import CLOSE, ahead, is_work, longer, rested, went_on
-from der.analysis.snap import Landing, snap_details
+from der.analysis.snap import Landing, check_symmetry, snap_details
 from der.errors import ContinuationFailed, Reason
 from der.problem import Point, Statistics
 from der.rod.equilibrium import Equilibrium
@@ -44,13 +44,13 @@ def follow_relaxed(
     Gamma grows in steps of ``rise`` [rad], and every load asked for is one of them. Limits of the
     moment are located by parabolas through relaxed states. A state far from the extrapolation of
     the last ones has snapped; the gamma of the snap is bracketed by bisection to `RESOLUTION`
-    ("gamma_uncertainty" of the landing). Indices and self-crossings are not computed. Tangents and
-    slopes are differences of second order. ``tolerance`` is that of `relaxation.relax`.
+    ("gamma_uncertainty" of the landing). Self-crossings are not looked for. Tangents and slopes are
+    differences of second order. ``tolerance`` is that of `relaxation.relax`.
 
     Raises
     ------
     ContinuationFailed
-        If the ring does not come to rest.
+        If the ring does not come to rest, or rests in no minimum.
     """
     loading = _Relaxation(ring, request, statistics, rise, tolerance, every)
     last = start
@@ -91,6 +91,24 @@ class _Relaxation:
             raise ContinuationFailed(place, Reason.NOT_AT_REST)
         return found
 
+    def minimum(self, at: Equilibrium) -> Point[Equilibrium]:
+        """The point of a relaxed state.
+
+        Raises
+        ------
+        ContinuationFailed
+            If it is no minimum of the full ring.
+        """
+        index, _ = self.ring.indices(at.state)
+        check_symmetry(self.ring, at, index)
+        if index[0]:
+            raise ContinuationFailed(
+                f"the ring rests at gamma = {at.parameter:.8f} in no minimum: relaxation keeps the"
+                " symmetry that it would have to lose",
+                Reason.NO_MINIMUM,
+            )
+        return Point(at)
+
     def loads(self, first: float) -> list[float]:
         """Loads to relax at, in order from ``first``."""
         last, most = self.request.gamma_max, self.request.options.max_steps
@@ -119,7 +137,7 @@ def _relaxed_states(
     ring = loading.ring
     first = loading.relaxed(ring.start if start is None else start.state)
     recent = [rested(ring, [], first)]
-    yield Point(recent[-1])
+    yield loading.minimum(recent[-1])
     largest = 0.0  # moment so far
     loads = loading.loads(first.state.load)[::-1]
     while loads:
@@ -135,12 +153,13 @@ def _relaxed_states(
             loads.pop()
             at = rested(ring, recent, found)
             recent = longer(ring, recent, found)
-            yield Point(at)
+            yield loading.minimum(at)
         elif abs(loads[-1] - here) > RESOLUTION:
             loads.append(0.5 * (here + loads[-1]))
         else:
             landing = _landed(loading, recent, loads.pop())
             recent = [landing.solution]
+            loading.minimum(landing.solution)
             yield landing
 
 

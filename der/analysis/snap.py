@@ -13,7 +13,7 @@ import numpy as np
 
 from der.analysis.request import Request
 from der.errors import ContinuationFailed, Reason
-from der.problem import PARAMETER, Increment, Point, Statistics
+from der.problem import PARAMETER, Increment, Indices, Point, Statistics
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.relaxation import Relaxed, Rest, relax
@@ -60,6 +60,19 @@ def downhill(ring: GrippedRing, before: Equilibrium) -> Increment:
         return relax(ring, before.state, kick=kick, most=1).energy_start
 
     return min((ring.increment(sign * mode / norm) for sign in (1.0, -1.0)), key=energy)
+
+
+def check_symmetry(ring: GrippedRing, at: Equilibrium, index: Indices | None) -> None:
+    """Raise an error if a state is unstable in a class that the sector cannot follow."""
+    counts = list(zip(ring.classes, index or (), strict=False))
+    breaking = [name for name, count in counts[1:] if count]
+    if breaking:
+        raise ContinuationFailed(
+            f"the state at gamma = {at.parameter:.8f} is unstable to modes"
+            f" ({', '.join(breaking)}) that break the symmetry of its {ring.name};"
+            " the sector 'full' follows it",
+            Reason.BREAKS_SYMMETRY,
+        )
 
 
 def snap_details(
@@ -239,6 +252,10 @@ def _settled(
         elif own != 0:
             mode = downhill(ring, after)
             start, reason = ring.retract(after.state, ring.displacement(mode, KICK)), f"index {own}"
+        elif moment is not None and after.slope < 0.0:
+            # with the moment held there is one more unstable mode: the tangent
+            start = ring.retract(after.state, ring.displacement(after.tangent, KICK))
+            reason = "dM/dgamma < 0"
         elif moment is None and pressing is not None and snapping.overruns(after, pressing):
             # the ring moves back from the stop, to its equilibrium under the dead moment
             near = snapping.polished(after.state, pressing)

@@ -174,12 +174,95 @@ def test_a_branch_that_returns_to_its_symmetric_path_is_followed_back():
     assert points[-1].solution.parameter == 0.0
 
 
-def test_a_march_does_not_start_from_a_saddle():
-    """An unstable state is refused, with a sentence."""
-    between = next(point for point in path(1.6) if point.index == (1, 0, 0))
+def test_a_march_that_starts_from_a_saddle_snaps_at_once():
+    """At the same gamma, onto the path of the minima, and goes on from there."""
+    between = next(point for point in path(1.6) if point.index == (1, 0, 0) and not point.kind)
     ring = gripped_ring(der.circle(), der.rectangular_section(1.6), 64)
-    with pytest.raises(ContinuationFailed, match="no minimum"):
-        next(follow_angle(ring, Request(), Statistics(), start=between.solution.state))
+    request = Request(self_crossings=False)
+    march = follow_angle(ring, request, Statistics(), start=between.solution.state)
+    start, landing, *rest = march
+    assert start.index == (1, 0, 0)
+    assert landing.kind == "snap"
+    assert landing.solution.parameter == start.solution.parameter
+    assert landing.details["energy_released"] > 0.0
+    assert all(set(point.index or (0,)) == {0} for point in (landing, *rest))
+
+
+# --- rings of other natural curvature, alpha = beta = 1.3 -----------------------------------------
+
+
+def curved(natural_curvature: float, name: str = "quarter", n_edges: int = 64) -> GrippedRing:
+    """Return a gripped ring of another natural curvature than its own."""
+    ring, section = der.circle(natural_curvature=natural_curvature), der.section(1.3, 1.3)
+    return gripped_ring(ring, section, n_edges, name=name)
+
+
+def least_slope(points: list[Point[Equilibrium]]) -> float:
+    """Smallest dM/dgamma of the regular states, those of snaps and at limits left out."""
+    return min(one.solution.slope for one in points if not one.kind)
+
+
+@pytest.mark.parametrize("name", ["quarter", "full"])
+def test_a_flat_ring_that_no_dead_moment_holds_snaps_at_once(name):
+    """Natural curvature 2: index 0 at gamma = 0 with the angle held, but dM/dgamma < 0 there.
+
+    It opens to gamma = 1.556243, U = 3.562936 (64 edges), and back there from pi: the folded ring
+    is its mirror image. What is released is what the flat ring has more.
+    """
+    ring = curved(2.0, name)
+    flat, first, *rest = follow_moment(ring, Request(), Statistics(), unload=True)
+    assert flat.solution.slope < 0.0
+    assert first.kind == "snap"
+    gamma, moment, energy = ring.values(first.solution)
+    assert gamma == pytest.approx(1.556243, abs=1e-6)
+    assert moment == pytest.approx(0.0, abs=1e-9)
+    assert energy == pytest.approx(3.562936, abs=1e-6)
+    released = ring.copies * flat.solution.energy - energy
+    assert first.details["energy_released"] == pytest.approx(released, abs=1e-9)
+    assert least_slope(rest) > 0.0
+
+
+def test_the_end_state_of_that_snap_converges():
+    """To gamma = 1.5544815, U = 3.5514888, by Romberg's scheme from 64, 128, 256 edges."""
+    values = []
+    for n_edges in (64, 128, 256):
+        ring = curved(2.0, n_edges=n_edges)
+        _, first, *_ = follow_moment(ring, Request(), Statistics())
+        gamma, _, energy = ring.values(first.solution)
+        values.append(np.array([gamma, energy]))
+    a, b, c = values
+    once = (4.0 * b - a) / 3.0, (4.0 * c - b) / 3.0
+    assert (16.0 * once[1] - once[0]) / 15.0 == pytest.approx([1.5544815, 3.5514888], abs=2e-7)
+
+
+@pytest.mark.parametrize(("name", "modes"), [("quarter", "odd"), ("half", "out of phase")])
+@pytest.mark.parametrize("follower", ["angle", "moment", "relaxed"])
+def test_a_start_that_its_sector_cannot_leave_is_refused(follower, name, modes):
+    """Natural curvature -1: the flat ring has index 2, by modes that break the symmetry."""
+    ring, found = curved(-1.0, name), []
+    with pytest.raises(ContinuationFailed, match=rf"gamma = 0.0+ is unstable to modes \({modes}\)"):
+        found.extend(FOLLOWERS[follower](ring, Request(stability=False), Statistics()))
+    assert len(found) <= 1
+
+
+@pytest.mark.parametrize("follower", ["angle", "moment"])
+def test_the_full_ring_leaves_its_unstable_flat_state(follower):
+    """It snaps at once, at gamma = 0, and is a minimum under its control from then on."""
+    ring = curved(-1.0, "full")
+    flat, first, *rest = FOLLOWERS[follower](
+        ring, Request(self_crossings=False), Statistics(), unload=True
+    )
+    assert flat.index == (2,)
+    assert first.kind == "snap"
+    assert first.details["energy_released"] == pytest.approx(2.111276, abs=1e-6)
+    assert all(set(point.index or (0,)) == {0} for point in (first, *rest))
+    assert follower == "angle" or least_slope(rest) > 0.0
+
+
+def test_relaxation_does_not_call_a_saddle_its_rest():
+    """The flat full ring of natural curvature -1 is at rest by symmetry, with index 2."""
+    with pytest.raises(ContinuationFailed, match="in no minimum"):
+        next(follow_relaxed(curved(-1.0, "full"), Request(), Statistics()))
 
 
 # --- dead moment ------------------------------------------------------------------------------
@@ -377,10 +460,11 @@ def test_relaxation_finds_the_limits_of_the_moment():
 def test_relaxation_on_few_edges_finds_what_newton_does(shape, n_edges, h_over_t, nu, curvature):
     """Limits 1e-3 rad before a fold, and the snap past it, in steps of 0.05 rad.
 
-    Once a parabola through the steps put the limit beyond the fold, on another branch.
+    Once a parabola through the steps put the limit beyond the fold, on another branch. At 2.92 the
+    square becomes unstable to odd modes, which its quarter cannot follow.
     """
     ring = gripped_ring(shape, der.rectangular_section(h_over_t, nu), n_edges, measure=curvature)
-    request = Request(stability=False, self_crossings=False)
+    request = Request(gamma_max=2.9, stability=False, self_crossings=False)
     here, there = (
         [v for v in follower(ring, request, Statistics()) if v.kind in ("limit", "snap")]
         for follower in (follow_relaxed, follow_angle)
