@@ -22,7 +22,9 @@ _CHORD = 2e-7  # of s: a residual of 1e-12 displaces its ends by 1e-5, its sagit
 _NEXT = 1e-6  # of s: distance at which dparameter/dconjugate is computed; next to a branch point
 # both rates lose digits, their quotient does not
 _AT = 0.1  # of `_NEXT`: largest distance of its root; places have errors of at most 1e-9
-_NEARLY = 0.25  # of the softer end: the minimum of a parabola below this is computed
+_AHEAD = 1e-3  # of an interval: distance over which the rate of a stiffness is taken
+_STEEPER = 1.5  # rates are taken to be so much larger than found
+_HALVINGS = 4  # of a step, in the search for two changes of opposite sense
 
 Place: TypeAlias = tuple[float, int | None]  # s, and the index of a class there
 Found: TypeAlias = tuple[float, Solution[Any]]
@@ -88,27 +90,43 @@ class Counting:
         return search(first, last) if wider else search(low, high)
 
     def between_equals(
-        self, low: Place, high: Place, stiffness: tuple[float, float]
+        self, low: Place, high: Place, stiffness: tuple[float, float], halvings: int = _HALVINGS
     ) -> list[Place]:
         """A place between two of equal index where the index is different, if there is one.
 
         Two changes of opposite sense within a step are visible at its ends only by a soft mode
-        (``stiffness`` there). Then the index is computed midway, and where the parabola through the
-        three stiffnesses is closest to zero.
+        (``stiffness`` there). While it softens towards a minimum its stiffness lies above the
+        tangents at both ends. Only where these meet beyond zero is the index computed.
         """
-        if min(map(abs, stiffness)) > self.system.soft:
+        if not halvings or min(map(abs, stiffness)) > self.system.soft:
             return []
+        u = self._meet(low[0], high[0], stiffness)
+        if u is None:
+            return []
+        s = low[0] + u * (high[0] - low[0])
+        (count,), (stiff,) = self.system.indices(self.step.at(s).state, self.symmetry)
+        if count != low[1]:
+            return [] if count is None else [(s, count)]
+        place = (s, count)
+        return self.between_equals(
+            low, place, (stiffness[0], stiff), halvings - 1
+        ) or self.between_equals(place, high, (stiff, stiffness[1]), halvings - 1)
 
-        def seen(u: float) -> tuple[Place, float]:
-            s = low[0] + u * (high[0] - low[0])
-            (count,), (stiff,) = self.system.indices(self.step.at(s).state, self.symmetry)
-            return (s, count), stiff
-
-        place, middle = seen(0.5)
-        u = _closest(stiffness[0], middle, stiffness[1])
-        if place[1] == low[1] and u is not None:
-            place, _ = seen(u)
-        return [] if place[1] in (low[1], None) else [place]
+    def _meet(self, low: float, high: float, stiffness: tuple[float, float]) -> float | None:
+        """Where between two places, 0 to 1, the tangents of the stiffness meet beyond zero."""
+        first, last = stiffness
+        if first * last <= 0.0:  # not of one mode
+            return 0.5
+        rates = [0.0, 0.0]
+        for end in sorted((0, 1), key=lambda end: abs(stiffness[end])):  # often one is enough
+            inward = _AHEAD if end == 0 else -_AHEAD
+            state = self.step.expected((low, high)[end] + inward * (high - low))
+            _, (beside,) = self.system.indices(state, self.symmetry)
+            rise = beside - stiffness[end]
+            if rise * stiffness[end] >= 0.0:  # it stiffens from this end on
+                return None
+            rates[end] = _STEEPER * rise / inward
+        return meeting(first, rates[0], last, rates[1])
 
     def beside_folds(
         self, low: tuple[Place, Solution[Any]], last: Place, folds: Sequence[Found]
@@ -138,14 +156,14 @@ def _jump(low: Place, high: Place) -> int:
     return (high[1] or 0) - (low[1] or 0)
 
 
-def _closest(first: float, middle: float, last: float) -> float | None:
-    """Where in (0, 1) the parabola through three values of one sign is close to zero, or None."""
-    slope, curvature = last - first, 2.0 * (first + last - 2.0 * middle)
-    if first * last <= 0.0 or curvature * first <= 0.0 or abs(slope) >= abs(curvature):
-        return None
-    u = 0.5 - 0.5 * slope / curvature
-    least = middle - 0.25 * slope * slope / curvature
-    return u if least / first < _NEARLY * min(1.0, last / first) else None
+def meeting(first: float, rate: float, last: float, last_rate: float) -> float | None:
+    """Where in (0, 1) the tangents to a function at 0 and 1 meet, if that is beyond zero.
+
+    Its values there are of one sign, and become smaller from either end on. A function without a
+    point of inflection does not reach zero otherwise.
+    """
+    u = (last - first - last_rate) / (rate - last_rate)
+    return None if first * (first + u * rate) > 0.0 else min(max(u, 0.1), 0.9)
 
 
 def is_fold(step: Step[Any], s: float) -> bool:

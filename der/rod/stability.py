@@ -25,6 +25,8 @@ from der.rod.supports import Supports, check_cut
 _SAFE = 1e-7  # scaled border pivot above which an index needs no second look: wrong counts were
 # seen up to 6e-10 on random matrices
 _SETTLED = 1e-13  # of an eigenvalue: its change in the last round
+_ROUNDS = 3  # of inverse iteration, in the estimate of a stiffness
+_IRRATIONAL = (0.6180339887498949, 0.7548776662466927)  # their multiples fill (0, 1) evenly
 _SHIFT = 1e-8  # of the largest stiffness: the second look
 
 
@@ -66,43 +68,94 @@ def _class_matrix(rod, supports, system, free, weight, axis, quat, stretch, load
     return take_out(free, system.diag, system.off, border)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _stiffness(rod, free, factors):
-    """Estimate of the eigenvalue nearest to zero: the Rayleigh quotient of one inverse iteration.
+    """Estimate of the eigenvalue nearest to zero, by `_ROUNDS` of inverse iteration of two vectors.
 
-    It is good where that eigenvalue stands apart from the rest, as one close to zero does.
+    The largest compliance among the two in their span; one alone would mix modes of either sign.
     """
     n, b = free.shape
     M = factors.schur.shape[0]
-    start, x = np.zeros((n, b, 1)), np.zeros((n, b, 1))
-    for j in range(n):  # neither smooth nor of any symmetry
+    start, x = np.zeros((n, b, 2)), np.zeros((n, b, 2))
+    for j in range(n):  # of no symmetry, neither smooth nor of any sign
         for i in range(b):
             if free[j, i]:
-                start[j, i, 0] = 0.5 + ((j * b + i) * 0.6180339887498949) % 1.0
-                x[j, i, 0] = rod.length[j] * start[j, i, 0]
-    solve_band(factors.inverse, factors.lower, x)
-    A, y = factors.schur.copy(), np.zeros((M, 1))
-    for j in range(n):
-        for i in range(b):
-            for p in range(M):
-                y[p, 0] -= factors.border[j, i, p] * x[j, i, 0]
-    if not solve_dense(A, y):
-        return 0.0
-    top, bottom = 0.0, 0.0
-    for j in range(n):
-        for i in range(b):
-            if free[j, i]:
-                s = x[j, i, 0]
+                for r in range(2):
+                    x[j, i, r] = ((j * b + i + 1) * _IRRATIONAL[r]) % 1.0 - 0.5
+    y, c = np.empty((M, 2)), np.zeros((2, 2))
+    for _ in range(_ROUNDS):
+        _orthonormalise(rod.length, x)
+        for j in range(n):
+            for i in range(b):
+                for r in range(2):
+                    start[j, i, r] = x[j, i, r]
+                    x[j, i, r] *= rod.length[j]
+        solve_band(factors.inverse, factors.lower, x)
+        A = factors.schur.copy()
+        for p in range(M):
+            for r in range(2):
+                y[p, r] = 0.0
+        for j in range(n):
+            for i in range(b):
                 for p in range(M):
-                    s -= factors.lifted[j, i, p] * y[p, 0]
-                top += rod.length[j] * s * start[j, i, 0]
-                bottom += rod.length[j] * s * s
-    return top / bottom if bottom > 0.0 else 0.0
+                    for r in range(2):
+                        y[p, r] -= factors.border[j, i, p] * x[j, i, r]
+        if not solve_dense(A, y):
+            return 0.0
+        for j in range(n):
+            for i in range(b):
+                for r in range(2):
+                    if not free[j, i]:
+                        x[j, i, r] = 0.0
+                        continue
+                    for p in range(M):
+                        x[j, i, r] -= factors.lifted[j, i, p] * y[p, r]
+    for j in range(n):
+        for i in range(b):
+            for r in range(2):
+                for q in range(2):
+                    c[q, r] += start[j, i, q] * rod.length[j] * x[j, i, r]
+    middle, half = 0.5 * (c[0, 0] + c[1, 1]), 0.5 * (c[0, 0] - c[1, 1])
+    radius = np.sqrt(half * half + c[0, 1] * c[1, 0])
+    largest = middle + radius if middle > 0.0 else middle - radius
+    return 1.0 / largest if largest != 0.0 else 0.0
 
 
 @njit(cache=True)
-def _counts(rod, supports, classes, quat, stretch, force, load, shift, looks):
-    """Index, its safety, and (if ``looks``) the stiffness of the softest mode, (k,) each."""
+def _orthonormalise(length, out_x):
+    """Make the two columns of (n, b, 2) orthonormal in the product with the edges' lengths."""
+    n, b, _ = out_x.shape
+    first, mixed, second = 0.0, 0.0, 0.0
+    for j in range(n):
+        for i in range(b):
+            first += length[j] * out_x[j, i, 0] ** 2
+            mixed += length[j] * out_x[j, i, 0] * out_x[j, i, 1]
+    part = mixed / first if first > 0.0 else 0.0
+    for j in range(n):
+        for i in range(b):
+            out_x[j, i, 1] -= part * out_x[j, i, 0]
+            second += length[j] * out_x[j, i, 1] ** 2
+    one = 1.0 / np.sqrt(first) if first > 0.0 else 0.0
+    other = 1.0 / np.sqrt(second) if second > 0.0 else 0.0  # 0 where there is one unknown only
+    for j in range(n):
+        for i in range(b):
+            out_x[j, i, 0] *= one
+            out_x[j, i, 1] *= other
+
+
+@njit(cache=True)
+def _counts(
+    cell, length, mass, rest, bending, stretching, measure, closed,
+    free, weight, axis, target, turn, turn_axis, pull, reach,
+    frees, weights, axes, conditions, quat, stretch, force, load, shift, looks,
+):  # fmt: skip
+    """Index, its safety, and (if ``looks``) the stiffness of the softest mode, (k,) each.
+
+    Rod, supports and classes come field by field: numba is slow to take named tuples apart.
+    """
+    rod = Rod(cell, length, mass, rest, bending, stretching, measure, closed)
+    supports = Supports(free, weight, axis, target, turn, turn_axis, pull, reach)
+    classes = Stack(frees, weights, axes, conditions)
     k = classes.free.shape[0]
     n, b = supports.free.shape
     negative, margin = np.empty(k, dtype=np.int64), np.empty(k)
@@ -111,10 +164,10 @@ def _counts(rod, supports, classes, quat, stretch, force, load, shift, looks):
     for c in range(k):
         m = classes.conditions[c]
         # copies: what they are slices of need not be contiguous, and one kind is compiled
-        weight, axis = classes.weight[c, :m].copy(), classes.axis[c, :m].copy()
-        free = classes.free[c].copy()
+        own_weight, own_axis = classes.weight[c, :m].copy(), classes.axis[c, :m].copy()
+        own_free = classes.free[c].copy()
         diag, off, border = _class_matrix(
-            rod, supports, system, free, weight, axis, quat, stretch, load
+            rod, supports, system, own_free, own_weight, own_axis, quat, stretch, load
         )
         if shift != 0.0:
             for j in range(n):
@@ -124,7 +177,7 @@ def _counts(rod, supports, classes, quat, stretch, force, load, shift, looks):
         count, margin[c] = inertia(factors)
         negative[c] = count - m
         if looks and count >= 0:
-            stiffness[c] = _stiffness(rod, free, factors)
+            stiffness[c] = _stiffness(rod, own_free, factors)
     return negative, margin, stiffness
 
 
@@ -153,21 +206,22 @@ def indices_and_stiffness(
 def _certified(
     rod: Rod, supports: Supports, classes: Stack, state: State, *, looks: bool
 ) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
-    at = (rod, supports, classes, state.quat, state.stretch, state.force, state.load)
+    at = (*rod, *supports, *classes, *state)
     negative, margin, stiffness = _counts(*at, 0.0, looks)
     counts: list[int | None] = negative.tolist()
-    doubtful = ~((negative >= 0) & (margin > _SAFE))
-    if doubtful.any():
+    safe = margin.tolist()
+    doubtful = [c for c in range(len(safe)) if negative[c] < 0 or not safe[c] > _SAFE]
+    if doubtful:
         shift = _SHIFT * float(rod.stiffness.max())
         below, above = (_counts(*at, s, False)[0] for s in (-shift, shift))
-        for c in np.flatnonzero(doubtful):
+        for c in doubtful:
             counts[c] = int(below[c]) if below[c] == above[c] >= 0 else None
     return tuple(counts), tuple(stiffness.tolist())
 
 
 def raw_index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> int:
     """The index by the signs of the pivots alone, as a bisection for its changes needs it."""
-    at = (rod, supports, stack([modes]), state.quat, state.stretch, state.force, state.load)
+    at = (*rod, *supports, *stack([modes]), *state)
     return int(_counts(*at, 0.0, False)[0][0])
 
 

@@ -310,6 +310,18 @@ def test_indices_of_the_folded_ring(h_over_t, indices):
     assert (at_pi.index, at_pi.index_moment, at_pi.index_free) == indices
 
 
+@pytest.mark.parametrize("sector", ["quarter", "half", "full"])
+@pytest.mark.parametrize(("alpha", "indices"), [(1.2, (0, 0, 0)), (1.0, (0, 1, 2))])
+def test_indices_of_a_naturally_straight_isotropic_ring(alpha, indices, sector):
+    """Michell and Zajac: twisted by 4 pi in all, it is stable without grips above alpha = 1.1547.
+
+    The ring without grips may also spin about its own tangents, at no cost of energy.
+    """
+    ring, section = der.circle(natural_curvature=0.0), der.section(alpha, alpha)
+    at_pi = der.fold(der.Scene(ring, section, sector=sector, self_crossings=False)).at_pi
+    assert (at_pi.index, at_pi.index_moment, at_pi.index_free) == indices
+
+
 def test_free_index_is_unknown_where_grips_carry_a_moment():
     """h/t 1 is not folded at pi: without its grips it would not stay there."""
     assert folded(1.0).at_pi.index_free is None

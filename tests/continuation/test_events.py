@@ -1,5 +1,6 @@
 """What is found on the steps of a path where special points lie close together."""
 
+import functools
 import math
 from itertools import pairwise
 
@@ -10,11 +11,11 @@ from rods import lifted
 import der
 from der.analysis.request import Request
 from der.analysis.self_crossing import _on_its_side
-from der.continuation.bifurcations import _closest, is_fold
+from der.continuation.bifurcations import is_fold, meeting
 from der.continuation.events import Mark, located
 from der.continuation.extrema import _bisected
 from der.continuation.step import SAME, between
-from der.problem import Options, Point, Statistics
+from der.problem import Options, Point, Statistics, total_index
 from der.rod.gripped_ring import gripped_ring
 from der.rod.stability import index
 
@@ -116,19 +117,75 @@ def test_both_changes_are_on_the_path():
 
 
 @pytest.mark.parametrize(
-    ("values", "place"),
+    ("ends", "place"),
     [
-        ((0.04, -0.01, 0.04), 0.5),  # crosses twice
-        ((1.0, 0.1, 0.2), 0.7),  # 2 (u - 0.7)^2 + 0.02
-        ((-0.04, -0.001, -0.04), 0.5),  # the same from below
-        ((0.04, 0.03, 0.04), None),  # far from zero
-        ((0.04, 0.05, 0.04), None),  # bulges away from it
-        ((0.01, 0.05, 0.09), None),  # straight
+        ((0.04, -0.2, 0.04, 0.2), 0.5),  # -0.06 there
+        ((-0.04, 0.2, -0.04, -0.2), 0.5),  # the same from below
+        ((0.1, -0.4, 0.3, 0.4), 0.25),  # 0 there
+        ((0.04, -0.06, 0.04, 0.06), None),  # 0.01 there
+        ((0.01, -1.0, 0.98, 1.0), 0.1),  # all but at an end
     ],
 )
-def test_parabola_through_three_stiffnesses(values, place):
-    """Where it comes within a quarter of its softer end; exact for a parabola."""
-    assert _closest(*values) == (None if place is None else pytest.approx(place, abs=1e-12))
+def test_tangents_that_meet_beyond_zero(ends, place):
+    """The lower bound of a stiffness that softens from both ends of a step on."""
+    assert meeting(*ends) == (None if place is None else pytest.approx(place, abs=1e-12))
+
+
+@functools.cache
+def of_curved(natural_curvature: float, alpha: float, name: str, n_edges: int) -> tuple:
+    """Branch points of a circle of another natural curvature, alpha = beta: class, gamma, index."""
+    ring = gripped_ring(
+        der.circle(natural_curvature=natural_curvature),
+        der.section(alpha, alpha),
+        n_edges,
+        name=name,
+    )
+    points = list(Request(self_crossings=False, limits=False).follow(ring))
+    return tuple(
+        (one.solution.parameter, *(total_index(ring, side) for side in one.sides))
+        for one in points
+        if one.kind == "branch"
+    )
+
+
+@pytest.mark.parametrize("name", ["quarter", "half", "full"])
+@pytest.mark.parametrize(
+    ("n_edges", "first", "second"), [(64, 1.81974, 1.84745), (128, 1.81741, 1.84162)]
+)
+def test_a_pair_of_branch_points_within_one_step(name, n_edges, first, second):
+    """Natural curvature -1, alpha = beta = 1.3: index 8, 7, 8. On some meshes both lie in one step.
+
+    The mode's stiffness goes from -0.2 to 0.1 and back to -0.3 there, in units of torsion's.
+    """
+    found = of_curved(-1.0, 1.3, name, n_edges)
+    k = next(k for k, one in enumerate(found) if one[1:] == (8, 7))
+    assert found[k][0] == pytest.approx(first, abs=1e-5)
+    assert found[k + 1][0] == pytest.approx(second, abs=1e-5)
+    assert found[k + 1][1:] == (7, 8)
+
+
+@pytest.mark.parametrize(
+    ("natural_curvature", "alpha", "n_edges"),
+    [
+        (-0.9403747811199694, 1.5381643514719432, 64),  # the full ring once missed a pair
+        (-0.9403747811199694, 1.5381643514719432, 128),  # the half and the full ring did
+        (-1.02021926768725, 1.6743239305044937, 128),  # -0.70, 0.14, -0.54 within a step
+    ],
+)
+def test_all_sectors_find_the_same_branch_points(natural_curvature, alpha, n_edges):
+    """The index of the full ring on the two sides of each, and gamma, to 1e-7.
+
+    A pair of odd modes is one point on the quarter, and one for each class on the half.
+    """
+
+    def steps(name):
+        jumps: dict[float, int] = {}
+        for gamma, before, after in of_curved(natural_curvature, alpha, name, n_edges):
+            key = round(gamma, 6)
+            jumps[key] = jumps.get(key, 0) + after - before
+        return jumps
+
+    assert steps("quarter") == steps("half") == steps("full")
 
 
 # --- places -----------------------------------------------------------------------------------
@@ -179,7 +236,7 @@ def test_a_pair_breaks_the_symmetry_of_a_stadium_before_it_is_folded():
 def test_stiffness_is_estimated_well_where_it_is_small():
     """The sign is that of the softest mode, and the value good to 10 % below 0.02 of torsion's.
 
-    Truth: `softest_modes`, converged. The estimate is what one inverse iteration gives.
+    Truth: `softest_modes`, converged. The estimate is what three inverse iterations give.
     """
     ring = gripped_ring(SIXTY, der.rectangular_section(4.0), 64)
     torsion = (2.0 * math.pi / SIXTY.length) ** 2
