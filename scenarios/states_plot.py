@@ -68,7 +68,7 @@ def _entries() -> Iterator[Line2D]:
     for n, label in LABELS.items():
         yield style.entry(label, color=COLOURS[n])
     for k, look in STYLES.items():
-        yield style.entry("stable" if k == 0 else f"index {k}", color=INK, linestyle=look)
+        yield style.entry(f"index {k}", color=INK, linestyle=look)
     yield style.entry("threshold", ls="none", marker="|", ms=10, color=INK)
     for label, face, edge in DOTS:
         yield style.entry(label, **style.mark("o", 4.4, face) | {"markeredgecolor": edge})

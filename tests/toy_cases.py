@@ -23,7 +23,7 @@ POISON = TOY.case("x", (0.5, 0.5))
 def toy(case):
     """A disc of one label in a plane of another."""
     inside = math.hypot(case.b_over_a - 0.7, (case.h_over_t - 2.0) / 7.6) < 0.13
-    label = "stable, snap-through" if inside else "unfoldable"
+    label = "stable at fixed moment, snap-through" if inside else "unfoldable"
     return Row(case, label, inside, inside, moment=0.0, slope=1.0, seconds=random.random())
 
 

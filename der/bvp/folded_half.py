@@ -119,6 +119,17 @@ class Half:
         return i, 2 * (s - knots[i]) / length - 1, length
 
 
+def folded_half(ring: Ring) -> Half:
+    """Return the folded half of a ring.
+
+    Raises
+    ------
+    NotFolded
+        If no solution is found.
+    """
+    return uniform_bending(ring) if ring.symmetry == "D2" else bent_by_force(ring)
+
+
 def uniform_bending(ring: Ring) -> Half:
     """Return the folded half of a ring of D2 symmetry: f = 0 and k_d = 4 pi/L, Eq. (B.1).
 

@@ -7,7 +7,7 @@ from operator import index
 
 import numpy as np
 
-from der.bvp.folded_half import NotFolded, bent_by_force, uniform_bending
+from der.bvp.folded_half import NotFolded, folded_half
 from der.bvp.gauss import Array
 from der.bvp.planar_elastica import FOLDED_TURN
 from der.geometry.ring import Ring
@@ -73,7 +73,7 @@ def folded(ring: Ring, n: int = 960) -> Folded:
     if not isinstance(ring, Ring):
         raise ValueError(f"ring must be a der.Ring, got {ring!r}")
     n = _checked_count(n)
-    half = uniform_bending(ring) if ring.symmetry == "D2" else bent_by_force(ring)
+    half = folded_half(ring)
     s = np.linspace(0.0, ring.length, n, endpoint=False)
     first = s[: n // 2 + 1]
     turned, z = half.angle(first), half.place(first)

@@ -67,7 +67,7 @@ def _places(system: Collocation, at: Solution, s: Array) -> Array:
     """Positions (k, 3)."""
     inside, near, arm = _folded(system, s)
     i, weights = _integrals(system, at, inside)
-    d3 = np.einsum("ij,ijk->ik", weights, _directors(at.frames)[i, :, 2])
+    d3 = np.einsum("ij,ijk->ik", weights, directors(at.frames)[i, :, 2])
     x = at.places[i] + at.mesh.h[i, None] * d3
     end = at.places[-1]
     x -= np.array([0.0, end[1], 0.0]) if system.sector.piece.quarter else 0.5 * end
@@ -80,7 +80,7 @@ def _frames(system: Collocation, at: Solution, s: Array) -> Array:
     """Directors (k, 3, 3)."""
     inside, near, arm = _folded(system, s)
     q = moved_to(at.mesh, at.nodes[:-1], at.frames, inside)
-    d = _directors(q / np.linalg.norm(q, axis=1, keepdims=True))
+    d = directors(q / np.linalg.norm(q, axis=1, keepdims=True))
     d[near] *= REVERSED[:, None] * ABOUT_E2
     d[arm] *= REVERSED[:, None] * ABOUT_E3
     return d
@@ -97,7 +97,7 @@ def _integrals(system: Collocation, at: Solution, s: Array) -> tuple[Places, Arr
     return i, weights
 
 
-def _directors(q: Array) -> Array:
+def directors(q: Array) -> Array:
     """Rows d1, d2, d3 of each frame (..., 4), as in (A.10)."""
     a, b, c, d = np.moveaxis(q, -1, 0)
     rows = [
@@ -108,14 +108,17 @@ def _directors(q: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1)).copy()
 
 
+def moments(system: Collocation, at: Solution, d: Array) -> Array:
+    """Moments m0 + F x r (n, m, 3) at the stages, whose directors are ``d``."""
+    constants = system.sector.piece.loads @ at.p
+    inner = np.einsum("jl,ilk->ijk", system.rule.partial, d[:, :, 2])
+    x = at.places[:-1, None] + at.mesh.h[:, None, None] * inner
+    return np.asarray(constants[:3] + np.cross(constants[3:], x))
+
+
 def turning(system: Collocation, at: Solution) -> float:
     """Integral of k1 over the full ring [rad]."""
-    sector, mesh = system.sector, at.mesh
-    constants = sector.piece.loads @ at.p
-    m0, force = constants[:3], constants[3:]
-    d = _directors(at.frames)
-    inner = mesh.h[:, None, None] * np.einsum("jl,ilk->ijk", system.rule.partial, d[:, :, 2])
-    x = at.places[:-1, None] + inner
-    moment = m0 + np.cross(force, x)
-    k1 = mesh.rest + (d[:, :, 0] * moment).sum(axis=2) / sector.piece.stiffness[0]
+    sector, mesh, d = system.sector, at.mesh, directors(at.frames)
+    bending = (d[:, :, 0] * moments(system, at, d)).sum(axis=2)
+    k1 = mesh.rest + bending / sector.piece.stiffness[0]
     return sector.copies * float((mesh.h[:, None] * system.rule.weights * k1).sum())

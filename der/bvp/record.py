@@ -13,12 +13,13 @@ from der.bvp.collocation import Collocation, Solution
 from der.bvp.events import Point
 from der.bvp.full_ring import full_ring, turning
 from der.bvp.gauss import Array
+from der.bvp.released import index_free, planar
 from der.bvp.step import Statistics
 from der.errors import Reason
 from der.geometry.mesh import sites
 from der.records import path as records
 from der.records.configurations import Shapes
-from der.records.path import AtPi, Mode, Path, Timing, folding_mode, release
+from der.records.path import NO_MOMENT, AtPi, Mode, Path, Timing, folding_mode, release
 from der.scene import Scene
 from der.utils.run import Run
 
@@ -98,8 +99,10 @@ class Followed:
             return None, None
         k = int(np.argmax(gamma == math.pi))
         at = self.points[k].solution
-        at_pi = AtPi(at.moment, at.slope, at.energy, None, None, None)
         folded = self.three_covered(at)
+        without_load = abs(at.moment) <= NO_MOMENT * float(np.abs(moment).max())
+        free = index_free(planar(self.system, at)) if folded and without_load else None
+        at_pi = AtPi(at.moment, at.slope, at.energy, None, None, free)
         mode = folding_mode(gamma[: k + 1], moment[: k + 1], special, at_pi, three_covered=folded)
         return at_pi, mode
 

@@ -33,7 +33,8 @@ def solve_bvp(
     Parameters
     ----------
     scene : the ring, its section and what is wanted. Its sector is a quarter or a half; edges only
-        say where shapes are sampled; indices are not computed.
+        say where shapes are sampled. Of indices only that of the folded ring without grips is
+        computed, which says whether it stays folded when released.
     tolerance : of gamma/pi, M and U, relative to the largest on the path; from 1e-11 to 1e-3.
     progress : called with gamma [rad] after every state.
 

@@ -21,13 +21,8 @@ from der.records.path import Path
 from der.scene import Scene
 
 UNFOLDABLE = "unfoldable"
-LABELS = (
-    UNFOLDABLE,
-    "unstable, snap-through",
-    "unstable, snap-back",
-    "stable, snap-through",
-    "stable, snap-back",
-)
+HELD = ("unstable at fixed moment", "stable at fixed moment", "stays folded when released")
+LABELS = (UNFOLDABLE, *(f"{held}, snap-{way}" for held in HELD for way in ("through", "back")))
 FAILED = "failed"  # stands in place of a label
 PARAMETERS = ("b_over_a", "r_over_a", "vertex_angle", "natural_curvature", "h_over_t", "nu")
 OWN = {  # parameters of each shape, besides those of the section
@@ -88,7 +83,7 @@ class Case:
     @property
     def key(self) -> str:
         """Hash of the parameters, the tolerance and the version of this package."""
-        text = json.dumps([self.to_json(), _version()], sort_keys=True)
+        text = json.dumps([self.to_json(), _version(), LABELS], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
     def ring(self) -> Ring:
@@ -123,6 +118,7 @@ class Row:
     label : one of LABELS, or FAILED
     foldable, stable : see `der.records.path.folding_mode`; never stable if not foldable
     snapping : "none", "snap-through" or "snap-back", also of rings that are not foldable
+    stays_folded : whether a ring that is stable at fixed moment stays folded when released
     moment, slope : M [GJ/a] and dM/dgamma at the first arrival at pi
     folds : gammas of the folds [rad], in path order
     error : largest estimated error on the path, of gamma/pi and of M over the largest |M|
@@ -136,6 +132,7 @@ class Row:
     foldable: bool = False
     stable: bool = False
     snapping: str = "none"
+    stays_folded: bool = False
     moment: float | None = None
     slope: float | None = None
     folds: tuple[float, ...] = ()
@@ -165,9 +162,12 @@ class Row:
         """
         try:
             known = {**entries, "case": Case(**entries["case"]), "folds": tuple(entries["folds"])}
-            return cls(**known)
+            row = cls(**known)
         except (KeyError, TypeError) as problem:
             raise ValueError(f"not a row: {problem}") from problem
+        if row.label not in (*LABELS, FAILED):  # of another version of this package
+            raise ValueError(f"not a row: label is {row.label!r}")
+        return row
 
 
 def solve_case(case: Case) -> Row:
@@ -200,18 +200,21 @@ def row_of(case: Case, path: Path) -> Row:
     mode, at_pi = path.mode, path.at_pi
     if mode is None:
         return failed(case, "the path has not reached pi")
-    label = label_of(mode.foldable, mode.stable, mode.snapping)
+    stable, stays = bool(mode.stable), bool(mode.stable and mode.stable_free)
+    label = label_of(mode.foldable, stable + stays, mode.snapping)
     if label == FAILED:
         return failed(case, "a foldable ring without a limit of M")
     # a path that turns back never arrives at pi
     moment, slope = (None, None) if at_pi is None else (at_pi.moment, at_pi.slope)
-    how = (mode.foldable, bool(mode.stable), mode.snapping)
+    how = (mode.foldable, stable, mode.snapping, stays)
     folds = tuple(point.gamma for point in path.folds)
     return Row(case, label, *how, moment, slope, folds, _error(path))
 
 
-def label_of(foldable: bool, stable: bool | None, snapping: str) -> str:
+def label_of(foldable: bool, held: int, snapping: str) -> str:
     """The label of a folding mode; snapping is no part of it where the ring is not foldable.
+
+    ``held`` : the number of what a folded ring is, in HELD.
 
     M vanishes at 0 and pi of a foldable ring, so that it has a limit at least: FAILED without.
     """
@@ -219,7 +222,7 @@ def label_of(foldable: bool, stable: bool | None, snapping: str) -> str:
         return UNFOLDABLE
     if snapping == "none":
         return FAILED
-    return f"{'stable' if stable else 'unstable'}, {snapping}"
+    return f"{HELD[held]}, {snapping}"
 
 
 def _error(path: Path) -> float | None:

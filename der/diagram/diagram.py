@@ -236,7 +236,16 @@ POINT_COLUMNS = ("twist_axis", *PARAMETERS, "gamma", "moment", "error")
 BOUNDARY_COLUMNS = ("boundary", *POINT_COLUMNS, "curve")
 CORNER_COLUMNS = ("boundary", "other", *POINT_COLUMNS)
 CASE_COLUMNS = (
-    *("shape", "twist_axis", *PARAMETERS, "label", "foldable", "stable", "snapping"),
+    *(
+        "shape",
+        "twist_axis",
+        *PARAMETERS,
+        "label",
+        "foldable",
+        "stable",
+        "stays_folded",
+        "snapping",
+    ),
     *("moment", "slope", "folds", "error", "status", "message"),
 )
 CHECK_COLUMNS = (

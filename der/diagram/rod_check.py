@@ -20,7 +20,7 @@ Fold: TypeAlias = Callable[[Scene], Path]
 AWAY = 0.02  # of the diagram's side: further than this from every boundary
 # with half and a quarter of the edges, too, to extrapolate from
 WANTED: dict[str, Any] = {"n_edges": 128, "error_bars": True, "save_at": ()}
-WANTED |= {"stability": False, "self_crossings": False}
+WANTED |= {"self_crossings": False}
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class Curve:
 
     Attributes
     ----------
-    kind : "foldability", "stability", "snap-back", with " (scan)" after it here, or "exchange"
+    kind : one of KINDS, with " (scan)" after it here, "infinite slope" or "exchange"
     twist_axis : of its rings; one with b = a is the same about both axes
     points : in order along the curve
     """
@@ -103,6 +103,10 @@ def _stable(row: Row) -> bool | None:
     return row.stable if row.ok and row.foldable else None
 
 
+def _stays_folded(row: Row) -> bool | None:
+    return row.stays_folded if row.ok and row.stable else None
+
+
 def _snaps_back(row: Row) -> bool | None:
     return row.snapping == "snap-back" if row.ok and row.foldable else None
 
@@ -110,6 +114,7 @@ def _snaps_back(row: Row) -> bool | None:
 KINDS: Mapping[str, Callable[[Row], bool | None]] = {
     "foldability": _foldable,
     "stability": _stable,
+    "stays folded": _stays_folded,
     "snap-back": _snaps_back,
 }
 

@@ -19,6 +19,7 @@ from der.scene import Scene
 from der.utils.checks import Array
 from der.viz.curve import arc_length
 from der.viz.ribbon import unit
+from der.viz.titles import folded_text
 
 STATES = 64  # at least, from gamma = 0 to pi: the spline through them is then within 6e-4 of
 PER = 8  # the panel of one through 1024, measured on every curve of the figures
@@ -153,13 +154,13 @@ def plain(words: str) -> str:
 
 
 def in_words(mode: Mode | None) -> str:
-    """The folding mode in the paper's words: "stable, snap-back"."""
+    """The folding mode in words: "stays folded when released, snap-back"."""
     if mode is None:
         return "ends before $\\pi$"
     if not mode.foldable:
         return "not foldable"
     snapping = "no snap" if mode.snapping == "none" else mode.snapping
-    return f"{'stable' if mode.stable else 'unstable'}, {snapping}"
+    return f"{folded_text(mode)}, {snapping}"
 
 
 def at_vertices(curve: Curve, k: int) -> tuple[Array, Array]:

@@ -97,10 +97,15 @@ class AtPi(Checked):
 class Mode(Checked):
     """How a ring folds: the folding modes of the paper, judged at the first arrival at pi."""
 
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("stable_free",)  # of records before it was there
+
     foldable: Truth
-    stable: Truth | None  # None: not foldable
+    stable: Truth | None  # at fixed moment, by the slope: the paper's; None: not foldable
     snapping: Annotated[str, one_of(SNAPPING)]
-    stable_3d: Truth | None  # None: not known
+    stable_3d: Truth | None  # at fixed moment, by the index; None: not known
+    stable_free: Truth | None = (
+        None  # folded, stays so when released; None: not known, or not folded
+    )
 
 
 @dataclass(frozen=True)
@@ -247,6 +252,7 @@ def folding_mode(
         stable=at_pi.slope > 0.0 if foldable else None,
         snapping=snapping,
         stable_3d=None if at_pi.index_moment is None else at_pi.index_moment == 0,
+        stable_free=at_pi.index_free == 0 if foldable and at_pi.index_free is not None else None,
     )
 
 

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from der.records.path import Path
+from der.records.path import Mode, Path
 
 BETWEEN = "   |   "  # the parts of a title
 DEGREES = {"vertex_angle": "°"}
+STAYS, OPENS = "stays folded when released", "opens when released"
 SOLVERS = {"der": "rod", "bvp": "boundary-value problem"}
 
 
@@ -51,6 +52,15 @@ def section_text(section: Mapping[str, object], *, nu: bool = True) -> str:
         return f"α = {section['alpha']:.4g}, β = {section['beta']:.4g}"
     ratio = f", ν = {section['nu']:g}" if nu and section.get("nu") is not None else ""
     return f"h/t = {section['h_over_t']:.6g}{ratio}"
+
+
+def folded_text(mode: Mode) -> str:
+    """What a folded ring needs to stay so: "stable at fixed M, opens when released"."""
+    if mode.stable_free:
+        return STAYS
+    if not mode.stable or mode.stable_3d is False:
+        return "unstable at fixed M"
+    return f"stable at fixed M, {'released: unknown' if mode.stable_free is None else OPENS}"
 
 
 def mesh_text(numerics: Mapping[str, object]) -> str:

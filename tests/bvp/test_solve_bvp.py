@@ -37,9 +37,11 @@ def test_record_is_of_the_scene():
     assert (record.status, record.message) == ("done", "")
 
 
-def test_indices_are_not_claimed():
-    """Collocation counts no eigenvalues: every index is masked, and None in the JSON."""
+def test_indices_in_the_grips_are_not_claimed():
+    """They are masked, and None in the JSON; only that of the released folded ring is known."""
     record = path(der.circle(), 4.0)
+    assert record.at_pi.index_free == 0
+    assert record.mode.stable_free
     assert record.index.mask.all()
     assert record.index_moment.mask.all()
     assert record.at_pi.index is None

@@ -396,6 +396,7 @@ CONTRACT = {  # "The record": every key and its type
     "mode.stable": (bool, type(None)),
     "mode.snapping": WORD,
     "mode.stable_3d": (bool, type(None)),
+    "mode.stable_free": (bool, type(None)),
     "error": (type(None),),  # no error bars were asked for
     "timing.solve_s": NUMBER,
     "timing.newton_iterations": (int,),
@@ -511,7 +512,7 @@ def test_summary_is_printed_otherwise(run):
     code, out, err = run(*SMALL)
     assert (code, err) == (0, [])
     assert out.startswith("circle (natural curvature 1), h/t 4, nu 0.3 (alpha 0.771569, ")
-    assert "foldable, stable when folded, snap-through, stable in 3D at pi" in out
+    assert "foldable, snap-through, stays folded when released: yes, stable at pi at fixed" in out
 
 
 def test_stiffness_ratios_can_be_given(run):

@@ -33,12 +33,15 @@ from der.errors import ContinuationFailed
 
 # of circles: the fold at pi, the cusp, the slope of the folded ring; closed form the last
 THRESHOLDS = {"foldability": 1.5075766, "snap-back": 1.839582, "stability": 3.4699278}
+THRESHOLDS["stays folded"] = THRESHOLDS["stability"]  # two modes of a circle are one
 
 
 CORNERS = {  # of ellipses about y: b/a, h/t, gamma; a dense bisection of labels agrees to 4e-6
     ("exchange", "stability"): (0.784157664, 2.99846829, 2.66796943),
     ("snap-back", "stability"): (0.924023364, 3.40999610, 2.04633864),
     ("exchange", "foldability"): (0.775746065, 2.09776142, math.pi),
+    ("exchange", "stays folded"): (0.793386628, 3.50450884, 2.56974537),
+    ("snap-back", "stays folded"): (0.924924694, 3.47387138, 2.03872878),
 }
 
 

@@ -68,9 +68,13 @@ def test_parameters_of_another_shape_are_refused(wrong, message):
 @pytest.mark.parametrize(
     ("threshold", "below", "above"),
     [
-        (1.5076, "unfoldable", "unstable, snap-back"),
-        (1.8396, "unstable, snap-back", "unstable, snap-through"),
-        (3.4699, "unstable, snap-through", "stable, snap-through"),
+        (1.5076, "unfoldable", "unstable at fixed moment, snap-back"),
+        (1.8396, "unstable at fixed moment, snap-back", "unstable at fixed moment, snap-through"),
+        (
+            3.4699,
+            "unstable at fixed moment, snap-through",
+            "stays folded when released, snap-through",
+        ),
     ],
 )
 def test_labels_of_circles_change_at_known_thresholds(threshold, below, above):
@@ -89,10 +93,25 @@ def test_labels_of_circles_change_at_known_thresholds(threshold, below, above):
         assert labels == [below, above]
 
 
+def test_a_ring_that_is_stable_at_fixed_moment_and_opens_has_a_label_of_its_own():
+    """Ellipse 0.6 about x: released, it stays folded from h/t = 3.636062 on (truth_next.md)."""
+    rows = [solve_case(Case("ellipse", h, b_over_a=0.6)) for h in (2.1, 3.0, 3.63606, 3.63607)]
+    assert [row.label for row in rows] == [LABELS[1], LABELS[3], LABELS[3], LABELS[5]]
+    assert [row.stable for row in rows] == [False, True, True, True]
+    assert [row.stays_folded for row in rows] == [False, False, False, True]
+
+
+def test_a_row_with_labels_of_another_version_is_not_read():
+    """So that its case is solved again."""
+    entries = solve_case(CIRCLE).to_json() | {"label": "stable, snap-through"}
+    with pytest.raises(ValueError, match="not a row: label is 'stable, snap-through'"):
+        Row.from_json(entries)
+
+
 def test_row_holds_what_is_known_of_the_path():
     """h/t = 1.6: two folds, no moment at pi, and a slope there below zero."""
     row = solve_case(replace(CIRCLE, h_over_t=1.6))
-    assert (row.label, row.status, row.message) == ("unstable, snap-back", "ok", "")
+    assert (row.label, row.status, row.message) == ("unstable at fixed moment, snap-back", "ok", "")
     assert (row.foldable, row.stable, row.snapping) == (True, False, "snap-back")
     assert row.moment == pytest.approx(0.0, abs=1e-9)
     assert row.slope == pytest.approx(-1.29367163, abs=1e-5)
@@ -201,6 +220,6 @@ def test_what_is_not_allowed_is_refused_by_name(options, message):
         family(**{"name": "fig3a"} | options)
 
 
-def test_labels_are_the_paper_s_five():
-    """Un-foldable, and unstable or stable with either snap."""
-    assert len(LABELS) == 5
+def test_labels_are_those_of_the_paper_with_the_released_ring():
+    """Un-foldable, and unstable or stable at fixed moment or released, with either snap."""
+    assert len(LABELS) == 7

@@ -133,7 +133,7 @@ def test_command_says_what_it_did(diagram, folder, capsys):
     assert command(options_of(folder)) == 0
     text = capsys.readouterr().out
     assert f"{len(diagram.rows)} cases, 0 solved now" in text
-    assert "unstable, snap-back" in text
+    assert "unstable at fixed moment, snap-back" in text
     assert str(folder / "fig3a.png") in text
 
 
@@ -239,7 +239,7 @@ def disc(case):
     if math.hypot(x - 0.5, y - 0.5) > 0.3:
         return Row(case, LABELS[0], moment=1.0, slope=-5.0)
     stable, back = y > 0.5, x > 0.5
-    words = f"{'stable' if stable else 'unstable'}, snap-{'back' if back else 'through'}"
+    words = LABELS[1 + 2 * stable + back]
     folds = (2.0, 1.0) if back else ()
     return Row(
         case, words, True, stable, words.split(", ")[1], moment=0.0, slope=y - 0.5, folds=folds

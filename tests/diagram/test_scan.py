@@ -106,7 +106,7 @@ def test_cube_is_scanned_too(tmp_path):
 
     def ball(case):
         far = math.dist((case.vertex_angle / 90, case.h_over_t / 3), (0.8, 0.8))
-        return Row(case, "unfoldable" if far < 0.25 else "stable, snap-back")
+        return Row(case, "unfoldable" if far < 0.25 else "stable at fixed moment, snap-back")
 
     found = scanned(family("fig8a", finest=16), tmp_path / "cases.jsonl", Here(), ball)
     assert sum(edge**3 for _, edge in found.cells) == 16**3
@@ -383,7 +383,11 @@ def real(tmp_path_factory):
 def test_real_scan_sees_the_three_modes(real):
     """Around the circle, h/t = 1.4 to 2: unfoldable, then snap-back, then snap-through."""
     labels = Counter(row.label for row in real.sorted_rows)
-    assert set(labels) == {"unfoldable", "unstable, snap-back", "unstable, snap-through"}
+    assert set(labels) == {
+        "unfoldable",
+        "unstable at fixed moment, snap-back",
+        "unstable at fixed moment, snap-through",
+    }
 
 
 def test_rows_do_not_depend_on_the_number_of_workers(tmp_path, real):

@@ -119,7 +119,7 @@ def test_json_has_the_entries_of_the_contract():
     assert set(record["at_pi"]) == {
         *("moment", "slope", "energy", "index", "index_moment", "index_free")
     }
-    assert set(record["mode"]) == {"foldable", "stable", "snapping", "stable_3d"}
+    assert set(record["mode"]) == {"foldable", "stable", "snapping", "stable_3d", "stable_free"}
     assert set(record["timing"]) == {"solve_s", "newton_iterations", "steps"}
 
 
@@ -407,7 +407,9 @@ def mode(points=(), gamma=UP, at_pi=None, three_covered=True):
 
 def test_folded_ring_with_positive_slope_is_stable():
     """Foldable is M = 0 and three-covered at pi, stable is dM/dgamma > 0 there."""
-    assert mode() == Mode(foldable=True, stable=True, snapping="none", stable_3d=True)
+    assert mode() == Mode(
+        foldable=True, stable=True, snapping="none", stable_3d=True, stable_free=True
+    )
 
 
 def test_folded_ring_with_negative_slope_is_unstable():
@@ -427,6 +429,20 @@ def test_ring_without_moment_that_is_not_three_covered_is_not_foldable():
 def test_index_with_the_moment_held_decides_stability_in_space():
     found = [mode(at_pi=AtPi(0.0, 1.0, 9.7, 0, index, None)).stable_3d for index in (0, 2, None)]
     assert found == [True, False, None]
+
+
+def test_index_without_grips_decides_whether_a_folded_ring_stays_so():
+    """Null where the index is not known, and of a ring that is not folded."""
+    found = [mode(at_pi=AtPi(0.0, 1.0, 9.7, 0, 0, index)).stable_free for index in (0, 1, None)]
+    assert found == [True, False, None]
+    assert mode(three_covered=False).stable_free is None
+
+
+def test_a_mode_of_an_older_record_does_not_say_whether_the_ring_stays_folded():
+    """Its entry is null when it is read."""
+    record = json.loads(path().to_json())
+    del record["mode"]["stable_free"]
+    assert Path.from_json(json.dumps(record)).mode.stable_free is None
 
 
 def test_fold_on_the_path_is_a_snap_back_even_beside_limits():

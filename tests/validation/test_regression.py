@@ -117,7 +117,10 @@ def diagram(folder, *, shift=0.0, off=0.0, corner=0.5, label="unfoldable"):
     angles = [0.1 * (k + shift) for k in range(11)]
     arc = [((1.0 + off) * math.cos(a), (1.0 + off) * math.sin(a)) for a in angles]
     tables = {
-        "cases": [row(0.0, 0.0, label=label), row(1.0, 1.0, label="stable, snap-back")],
+        "cases": [
+            row(0.0, 0.0, label=label),
+            row(1.0, 1.0, label="stable at fixed moment, snap-back"),
+        ],
         "boundaries": [row(*place, boundary="stability", curve="0") for place in arc],
         "corners": [row(corner, corner, boundary="stability", other="snap-back")],
     }
@@ -133,7 +136,11 @@ def diagram(folder, *, shift=0.0, off=0.0, corner=0.5, label="unfoldable"):
         ({"off": 1e-7}, 0, ""),
         ({"off": 1e-4}, 3, "stability"),
         ({"corner": 0.5 + 1e-6}, 3, "snap-back"),
-        ({"label": "stable, snap-back"}, 3, "was 'unfoldable', is 'stable, snap-back'"),
+        (
+            {"label": "stable at fixed moment, snap-back"},
+            3,
+            "was 'unfoldable', is 'stable at fixed moment, snap-back'",
+        ),
     ],
 )
 def test_diagrams_are_compared_as_curves(tmp_path, capsys, change, code, words):

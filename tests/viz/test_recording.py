@@ -113,7 +113,11 @@ def test_everything_asked_for_has_its_place(read):
     for entity in (
         *("ring/ribbon", "ring/centreline", "ring/axis", "ring/trace/0", "ring/trace/1"),
         *(f"ring/grips/{g}/{k}" for g in ("first", "second") for k in ("rotation", "moment")),
-        *(f"curves/{c}/{k}" for c in ("moment", "energy") for k in ("stable", "unstable", "now")),
+        *(
+            f"curves/{c}/{k}"
+            for c in ("moment", "energy")
+            for k in ("stable_at_fixed_gamma", "unstable_at_fixed_gamma", "now")
+        ),
         *("series/moment", "series/energy", "series/gamma", "series/index"),
         *("events", "states/stability", "states/event", "about", "key/bar"),
     ):
@@ -272,7 +276,7 @@ def test_dot_is_on_the_curve_and_the_curve_has_its_two_kinds(path, read):
     dots = read.rows("/curves/moment/now", "Points2D:positions")
     stable, unstable = (
         [np.array(s) for s in read.rows(f"/curves/moment/{k}", "LineStrips2D:strips")[None]]
-        for k in ("stable", "unstable")
+        for k in ("stable_at_fixed_gamma", "unstable_at_fixed_gamma")
     )
     assert (len(stable), len(unstable)) == (2, 1)
     first, second = (fold.position for fold in path.folds)
@@ -292,7 +296,7 @@ def test_events_are_in_the_log_at_their_steps(path, read):
 
 def test_state_lines_change_where_the_ring_does(path, read):
     said = [state for (state,) in read.rows("/states/stability", "StateChange:state").values()]
-    assert said == ["stable", "index 1", "stable"]
+    assert said == ["stable at fixed γ", "index 1", "stable at fixed γ"]
     events = read.rows("/states/event", "StateChange:state")
     assert events[0] == ["start"]
     assert events[path.folds[0].position] == ["fold"]
@@ -370,7 +374,7 @@ def test_a_snap_is_a_dotted_drop_and_no_part_of_the_curve(tmp_path):
     assert len(dashes) > 10
     assert_allclose(dashes[0, 0], dots[snap - 1][0], atol=1e-4)
     assert np.hypot(*(dashes[-1, -1] - dots[snap][0])) < 1.5
-    curve = read.rows("/curves/moment/stable", "LineStrips2D:strips")[None]
+    curve = read.rows("/curves/moment/stable_at_fixed_gamma", "LineStrips2D:strips")[None]
     assert [len(strip) > 10 for strip in curve] == [True, True]
     assert_allclose(curve[0][-1], dots[snap - 1][0], atol=1e-4)
     assert_allclose(curve[1][0], dots[snap][0], atol=1e-4)
@@ -397,7 +401,11 @@ def test_one_state_is_a_recording(path, tmp_path):
 def test_path_without_stability_has_neither_index_nor_its_line(path, tmp_path):
     unknown = replace(path, index=counts([None] * len(path)))
     entities = written(tmp_path, unknown).entities
-    assert not entities & {"/series/index", "/states/stability", "/curves/moment/stable"}
+    assert not entities & {
+        "/series/index",
+        "/states/stability",
+        "/curves/moment/stable_at_fixed_gamma",
+    }
 
 
 # --- What is refused -------------------------------------------------------------------------

@@ -1,9 +1,10 @@
 """The boundaries between folding modes of one slice of a phase diagram.
 
-Where neighbouring cases of a scan differ, a boundary lies between them. Five kinds are curves on
+Where neighbouring cases of a scan differ, a boundary lies between them. Six kinds are curves on
 which a condition holds (`conditions`), and are traced across the slice (`tracing`):
 
     stability        the folded state loses its stability at fixed moment
+    stays folded     the folded state loses its stability when released
     foldability      the fold at which the path turns back reaches gamma = pi
     infinite slope   that fold merges with its mirror image in the folded state
     snap-back        two folds merge in a cusp

@@ -1,6 +1,7 @@
 """Conditions that hold on boundaries between folding modes, by ring and section.
 
     stability        the folded state at gamma = pi has dM/dgamma = 0
+    stays folded     released, it loses the stiffness of a class of motions
     foldability      the fold at which the path turns back lies at gamma = pi
     infinite slope   the folded state is where the path turns back: dgamma/dM = 0 there
     snap-back        two folds merge: dgamma/ds has an extremum that is zero (a cusp)
@@ -23,6 +24,7 @@ from der.bvp.collocation import Collocation, Direction, Solution, collocation, r
 from der.bvp.corrector import observe
 from der.bvp.gauss import Array
 from der.bvp.meshes import Mesh, fitted, mesh_at, moved_to
+from der.bvp.released import planar, stiffnesses
 from der.bvp.sectors import sector
 from der.diagram.curves.branch_exchange import Centre, centre, hysteresis, shot
 from der.errors import ContinuationFailed, Reason
@@ -55,6 +57,7 @@ class Value(NamedTuple):
     bend: Array | None = None  # likewise
     way: Array | None = None  # of an infinite slope, see `infinite_slope`: direction across it
     place: Array | None = None  # of an infinite slope: the place of the state, on the boundary
+    motion: int = 0  # of a released ring: which class of motions, see `der.bvp.released`
 
 
 Condition = Callable[[Scene, Value], Value]
@@ -138,10 +141,22 @@ def numbers(state: Value) -> Array:
 
 def stability(scene: Scene, seed: Value) -> Value:
     """DM/ds at gamma = pi; the seed is a folded state."""
+    found = _folded(scene, seed)
+    return found._replace(value=found.at.moment_rate)
+
+
+def stays_folded(scene: Scene, seed: Value) -> Value:
+    """Stiffness of a class of motions of the released ring; the seed is a folded state."""
+    found = _folded(scene, seed)
+    return found._replace(value=stiffnesses(planar(found.system, found.at))[seed.motion])
+
+
+def _folded(scene: Scene, seed: Value) -> Value:
+    """The folded state, without a value yet."""
     system, near = carried(scene, seed)
     guess = near.unknowns._replace(gamma=math.pi)
     found = _solved(system, near.mesh, guess, near.tangent, by_gamma=True)
-    return Value(found.moment_rate, found, system)
+    return Value(math.nan, found, system, motion=seed.motion)
 
 
 def infinite_slope(scene: Scene, seed: Value) -> Value:
@@ -279,6 +294,7 @@ def _root(system: Collocation, at: Solution, value: Callable[[Solution], float])
 
 KINDS: dict[str, Condition] = {
     "stability": stability,
+    "stays folded": stays_folded,
     "foldability": foldability,
     "infinite slope": infinite_slope,
     "snap-back": snap_back,

@@ -42,8 +42,10 @@ ORDER = (
     CUSP,
     "infinite slope",
     "stability",
+    "stays folded",
     FOLD,
 )  # a corner has the state of the first
+ON_FOLDED = {"stability", "stays folded"}  # two conditions on one state: where they meet they cross
 NEAR = 0.1  # of the square's side: largest distance of a corner from its bracket
 BESIDE = 0.02  # of the side: a curve that ends so near to a corner on it ends there
 ASIDE = 2.5e-3  # of the side: what a chord of a curve is off at most
@@ -135,7 +137,8 @@ def _meeting(one: Line, other: Line, u: Array, condition: ConditionOf) -> Met | 
     """
     (i, _), (j, _) = nearest(u, one.places), nearest(u, other.places)
     firsts, seconds = one.points[i : i + 2], other.points[j : j + 2]
-    if any(same(a.state, b.state) for a, b in product(firsts, seconds)):
+    alike = any(same(a.state, b.state) for a, b in product(firsts, seconds))
+    if alike and {one.kind, other.kind} != ON_FOLDED:
         return None  # they touch, or are one: polygons cross there by chance
 
     def led() -> Iterator[tuple[At[Value], At[Value]]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from der.bvp.collocation import Collocation, Solution, collocation
 from der.bvp.gauss import Array
+from der.bvp.released import planar, stiffnesses
 from der.bvp.sectors import sector
 from der.bvp.solve import solve_with_points
 from der.diagram.cases import Row
@@ -79,6 +80,8 @@ def differences(a: Row, b: Row) -> list[str]:
     if not a.foldable:
         return []
     kinds = ["stability"] if a.stable != b.stable else []
+    if a.stable and b.stable and a.stays_folded != b.stays_folded:
+        kinds.append("stays folded")
     return kinds + (["snap-back"] if a.snapping != b.snapping else [])
 
 
@@ -94,6 +97,9 @@ def seeds(kind: str, row: Row) -> Iterator[Value]:
     system = collocation(sector(scene))
     states = [point.solution for point in points]
     folds = [point.solution for point in points if point.kind == "fold"]
+    if kind == "stays folded":
+        yield from _softest(system, states[-1])
+        return
     if kind in ("stability", "infinite slope"):
         chosen = states[-1:]
     elif kind == "foldability":
@@ -106,6 +112,16 @@ def seeds(kind: str, row: Row) -> Iterator[Value]:
         return
     for at in chosen:
         yield Value(0.0, at, system)
+
+
+def _softest(system: Collocation, folded: Solution) -> Iterator[Value]:
+    """The folded state with each class of its motions when released, the softest first.
+
+    The first class is left out: it has the turning of the grips, whose stiffness is the slope.
+    """
+    left = np.abs(stiffnesses(planar(system, folded)))[1:]
+    for k in np.argsort(left):
+        yield Value(0.0, folded, system, motion=1 + int(k))
 
 
 def _closest(system: Collocation, states: list[Solution]) -> Iterator[Value]:

@@ -37,12 +37,25 @@ def _landscape(found: Landscape) -> list[str]:
     ]
     barriers = found.barriers
     known = barriers_text(found, barriers)
+    if found.folded:
+        known.append(_released(found.rests[-1].index_free))
     told = [title(found.path), *(["", *table(heads, rows)] if rows else []), "", *known]
     for said in dict.fromkeys(barriers.why.values()):
         if said != found.path.message:
             names = [name for name, why in barriers.why.items() if why == said]
             told.append(f"{' and '.join(names)}: {said}")
     return told
+
+
+def _released(index: int | None) -> str:
+    """What the barrier to open is worth when the grips are taken away."""
+    if index is None:
+        return "stays folded when released: unknown"
+    if index:
+        return (
+            f"stays folded when released: no, index {index}: this barrier holds in the grips only"
+        )
+    return "stays folded when released: yes; its barrier (--free) is then at most this one"
 
 
 def barriers_text(

@@ -54,13 +54,17 @@ def lines(path: Path) -> list[str]:
 
 def mode_text(mode: Mode) -> str:
     """The folding mode as a phrase."""
-    parts = ["foldable" if mode.foldable else "not foldable"]
-    if mode.stable is not None:
-        parts.append("stable when folded" if mode.stable else "unstable when folded")
-    parts.append("no snap" if mode.snapping == "none" else mode.snapping)
-    if mode.stable_3d is not None:
-        stable = "stable" if mode.stable_3d else "unstable"
-        parts.append(f"{stable} in 3D at pi (moment held)")
+    snap = "no snap" if mode.snapping == "none" else mode.snapping
+    parts = ["foldable" if mode.foldable else "not foldable", snap]
+    if mode.foldable:
+        stays = {True: "yes", False: "no", None: "unknown"}[mode.stable_free]
+        parts.append(f"stays folded when released: {stays}")
+    # by the index, which sees every motion; the slope dM/dgamma sees one
+    stable = mode.stable if mode.stable_3d is None else mode.stable_3d
+    if stable is not None:
+        parts.append(f"{'stable' if stable else 'unstable'} at pi at fixed moment")
+    if mode.stable and stable is False:
+        parts.append("although dM/dgamma > 0")
     return ", ".join(parts)
 
 

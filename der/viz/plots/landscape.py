@@ -14,7 +14,7 @@ from der.records.units import unit
 from der.utils.checks import Array
 from der.viz.palette import INK, QUIET
 from der.viz.plots import style
-from der.viz.titles import sure, title
+from der.viz.titles import OPENS, STAYS, sure, title
 
 KINDS = {"well": style.mark("o", 5.6, INK), "saddle": style.mark("^", 6.6)}  # of M = 0 states
 
@@ -95,6 +95,8 @@ def _saddle_and_well(axes: Axes, landscape: Landscape) -> None:
         index = "?" if rest.index_free is None else rest.index_free
         gamma, side = rest.gamma / math.pi, "bottom" if away > 0.0 else "top"
         text = f"{name}\n$\\gamma$ = {gamma:.4f} $\\pi$\nindex without grips: {index}"
+        if rest is end and landscape.folded and rest.index_free is not None:
+            text += f"\n{OPENS if rest.index_free else STAYS}"
         look = {"ha": "center", "va": side, "fontsize": 7.5}
         style.annotate(axes, (gamma, rest.energy), text, (0.0, away), **look)
     style.label_axes(axes, "$\\gamma/\\pi$", style.energy(path.scale), ticks=(5, 0))

@@ -21,7 +21,7 @@ from der.viz.palette import FREE, INK, POINTS, ROSE
 from der.viz.plots import style
 from der.viz.plots.rings import bare, place_ribbon
 from der.viz.ribbon import HALF_WIDTH, quadrilaterals
-from der.viz.titles import times_pi, title
+from der.viz.titles import folded_text, times_pi, title
 
 STATE: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.2, "color": INK}
 MANY = 250  # states; more would hide the line below them
@@ -99,14 +99,9 @@ def _reach(path: Path) -> str:
 
 
 def _mode(mode: Mode) -> str:
-    """The folding mode as text: "foldable, stable at fixed M, snap-through"."""
-    parts = ["foldable" if mode.foldable else "not foldable"]
-    if mode.stable is not None:
-        parts.append(f"{'stable' if mode.stable else 'unstable'} at fixed M")
-    if mode.stable and mode.stable_3d is False:
-        parts.append("but not in 3-D")
-    parts.append("no snap" if mode.snapping == "none" else mode.snapping)
-    return ", ".join(parts)
+    """The folding mode as text: "foldable, stays folded when released, snap-through"."""
+    snap = "no snap" if mode.snapping == "none" else mode.snapping
+    return f"foldable, {folded_text(mode)}, {snap}" if mode.foldable else f"not foldable, {snap}"
 
 
 def _entries(path: Path) -> list[Any]:

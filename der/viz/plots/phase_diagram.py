@@ -19,17 +19,20 @@ from der.viz.plots import style
 from der.viz.plots.regions import Boundary, Sheet, pixels
 
 DPI = 200
-REGIONS = (  # name and colour by label: the hue is the snapping, the strength stability
+REGIONS = (  # name and colour by label: the hue is the snapping, dark is what stays folded
     ("not foldable", "#ECECEC"),
-    ("unstable, snap-through", "#C9DFF1"),
-    ("unstable, snap-back", "#FBDCAE"),
-    ("stable, snap-through", "#62A3D3"),
-    ("stable, snap-back", "#E69138"),
+    ("unstable at fixed $M$, snap-through", "#DCEAF6"),
+    ("unstable at fixed $M$, snap-back", "#FDEBCF"),
+    ("stable at fixed $M$ only, snap-through", "#B4D2EA"),
+    ("stable at fixed $M$ only, snap-back", "#F8CE93"),
+    ("stays folded when released, snap-through", "#4A8FC4"),
+    ("stays folded when released, snap-back", "#DD7F22"),
     ("failed", "#FFFFFF"),
 )
 BOUNDARIES: dict[str, tuple[str, Any, float]] = {  # name, line style and width by kind
     "foldability": ("foldability (fold at $\\pi$)", "-", 1.5),
     "stability": ("stability at fixed $M$", (0, (4, 1.6)), 1.3),
+    "stays folded": ("stays folded when released", (0, (1.7, 0.7)), 2.4),
     "snap-back": ("snap-back (cusp)", (0, (1, 1.3)), 1.5),
     "infinite slope": ("foldability (infinite slope at $\\pi$)", (0, (7, 1.2)), 1.5),
     "exchange": ("branch exchange", (0, (8, 1.5, 1, 1.5)), 1.5),
@@ -103,9 +106,9 @@ def draw(diagram: DiagramPicture) -> Figure:
 
 def _one(diagram: DiagramPicture) -> tuple[Figure, list[Axes]]:
     """The page of one plane."""
-    width, height = (6.6, 5.22) if diagram.mirrored else (4.8, 5.02)
+    width, height = (6.6, 5.62) if diagram.mirrored else (4.8, 5.42)
     figure = style.blank(width, height, diagram.title, dpi=DPI)
-    box = (0.62 / width, 1.3 / height, 1.0 - 0.82 / width, 3.3 / height)
+    box = (0.62 / width, 1.7 / height, 1.0 - 0.82 / width, 3.3 / height)
     return figure, [figure.add_axes(box)]
 
 

@@ -67,7 +67,7 @@ def _caption(axes: Axes, state: PlanarState, found: PlanarStates) -> None:
     name = "\n".join(textwrap.wrap(state.name, 18))
     look: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
     style.place_text(axes, (0.5, -0.02), name, fontsize=8.0, linespacing=1.15, **look)
-    kind = "stable" if state.stable else f"index {'?' if state.index is None else state.index}"
+    kind = f"index {'?' if state.index is None else state.index}"
     energy = state.energy if abs(state.energy) > _ZERO * factor(found.scale, "energy") else 0.0
     height = "$U\\,a/GJ$" if found.scale is None else "$U$"
     unit_name = "" if found.scale is None else f" {unit(found.scale, 'energy')}"

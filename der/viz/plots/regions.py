@@ -16,7 +16,9 @@ from der.viz.curve import arc_length
 
 Labels = NDArray[np.int64]
 
-NOT_FOLDABLE, STABLE, BACK, FAILED = 0, 2, 1, 5  # a foldable ring: 1 + STABLE + BACK, as they apply
+NOT_FOLDABLE, FAILED = 0, 7
+HELD, BACK = 2, 1  # a foldable ring: 1 + HELD where stable at fixed moment + HELD where it stays
+# folded when released + BACK where it snaps back
 FINER = (4, 32)  # pixels between two nodes, at least and at most
 PIXELS = 512  # across all nodes
 BETWEEN = 6  # pieces of the line between two points of a boundary
@@ -28,7 +30,7 @@ class Sheet(NamedTuple):
     """The solved cases of one twisting axis, in one plane of a diagram."""
 
     axis: str  # "x" or "y"
-    labels: Labels  # (n, n) at the nodes of a lattice: NOT_FOLDABLE, 1 to 4, or FAILED
+    labels: Labels  # (n, n) at the nodes of a lattice: NOT_FOLDABLE, 1 to 6, or FAILED
     slopes: Array  # (n, n) dM/dgamma at pi, interpolated within cells
     beside: Array  # (m, 2) places of cases that are not nodes
     beside_labels: Labels  # (m,)
@@ -63,8 +65,8 @@ def pixels(sheet: Sheet, boundaries: Iterable[Boundary]) -> Labels:
     """Labels (k, k) of pixels between the nodes of a sheet.
 
     Beside a boundary the label is that of the nearest case on the same side. Elsewhere, a ring is
-    foldable or snaps back if most of its neighbours do, weighted by distance. It is stable if the
-    interpolated slope at pi is positive.
+    foldable, snaps back or stays folded if most of its neighbours do, weighted by distance. It is
+    stable at fixed moment if the interpolated slope at pi is positive.
     """
     labels = sheet.labels
     n = len(labels)
@@ -79,7 +81,9 @@ def pixels(sheet: Sheet, boundaries: Iterable[Boundary]) -> Labels:
     back = foldable & ((labels - 1) % 2 == BACK)
     stable = mean(np.where(foldable, sheet.slopes, 0.0)) > 0.0
     snaps_back = mean(back) > 0.5 * mean(foldable)
-    found: Labels = 1 + np.where(stable, STABLE, 0) + np.where(snaps_back, BACK, 0)
+    held = np.where(foldable, (labels - 1) // HELD, 0)
+    stays = mean(held == 2) > 0.5 * mean(held > 0)
+    found: Labels = 1 + HELD * np.where(stable, 1 + stays, 0) + np.where(snaps_back, BACK, 0)
     parts = [mean(labels == NOT_FOLDABLE), mean(foldable), mean(labels == FAILED)]
     winner = np.argmax(parts, axis=0)
     found[winner == 0] = NOT_FOLDABLE

@@ -76,7 +76,7 @@ def _caption(row: Axes, i: int, state: RingState, wide: float, zero: float) -> N
     name = "\n".join(textwrap.wrap(state.name, max(13, int(13 * wide))))
     style.place_text(row, (i, 0.47 / wide), name, fontsize=7.8, linespacing=1.1)
     energy = state.energy if abs(state.energy) > zero else 0.0
-    kind = "stable" if state.stable else f"index {'?' if state.index is None else state.index}"
+    kind = f"index {'?' if state.index is None else state.index}"
     look = {"fontsize": 7.0, "linespacing": 1.1, "color": _colour(state)}
     style.place_text(row, (i, 0.13 / wide), f"$U$ = {energy:.4g}\n{kind}", **look)
 

@@ -21,18 +21,19 @@ from der.viz.rerun.axes import PlotAxes, dotted, send_axes, send_labels
 from der.viz.rerun.entities import GREEN, ORANGE, QUIET, SKY, VERMILION, Colour, Entities
 from der.viz.ribbon import viridis
 
-# label, colour and radius of a stretch of the curves by whether it is stable
+# label, colour and radius of a stretch of the curves by its stability in the grips
 STRETCHES: dict[bool | str | None, tuple[str, Colour, float]] = {
-    True: ("stable", SKY, 0.9),
-    False: ("unstable", VERMILION, 0.5),
+    True: ("stable_at_fixed_gamma", SKY, 0.9),
+    False: ("unstable_at_fixed_gamma", VERMILION, 0.5),
     None: ("unknown", QUIET, 0.8),
     SNAP: ("snaps", ORANGE, 0.5),
 }
 CLASSES = (GREEN, SKY, ORANGE)  # of the eigenvalues of each symmetry
 MOVING = "in motion"
+HELD = "stable at fixed γ"
 # colours of the state lines; any index but 0 is vermilion
 STATES: dict[str, Colour] = {
-    "stable": (0, 114, 178),
+    HELD: (0, 114, 178),
     MOVING: (120, 94, 20),
     "start": (70, 70, 70),
     "fold": (204, 121, 167),
@@ -166,9 +167,7 @@ def send_events(sent: Entities, path: Path, *, name: str = "") -> None:
         sent.run("events", rr.TextLog.columns(text=texts), steps)
     kinds = [POINTS[point.kind] for point in path.points]
     names = {
-        k: f"index {i}" if i else "stable"
-        for k, i in enumerate(path.index.tolist())
-        if i is not None
+        k: f"index {i}" if i else HELD for k, i in enumerate(path.index.tolist()) if i is not None
     }
     names[-1] = MOVING
     at = enumerate(motion.position.tolist())
