@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +13,9 @@ from matplotlib.figure import Figure
 
 from der.bvp.folded_shape import folded
 from der.bvp.packing import packing_ratio
+from der.bvp.released import index_free, planar_shape, stiffnesses
 from der.geometry.ring import Ring
+from der.geometry.section import rectangular_section
 from der.geometry.shapes import ellipse, rectangle, triangle
 from der.paper import canvas
 from der.paper.canvas import INK, QUIET
@@ -24,7 +26,9 @@ from der.viz.plots import rings, style
 
 MAP_POINTS = 720  # on a ring of a map: packing ratios to about 1e-7
 SHAPE_POINTS = 600
-FOLDED, FLAT = "#0072B2", "#bdbdbd"  # blue of Okabe and Ito
+H_OVER_T, NU = 4.0, 0.3  # of the rings of which is said whether they stay folded when released
+FOLDED, OPENS, FLAT = "#0072B2", "#D55E00", "#bdbdbd"  # blue and vermilion of Okabe and Ito
+RELEASED = f"when released ($h/t$ = {H_OVER_T:g}, $\\nu$ = {NU:g})"
 LETTERS = "ABCDEFGH"
 DOT = style.mark("o", 4.5) | {"zorder": 4}
 # places of the labels of contours of fig. 9: away from the jump
@@ -56,8 +60,10 @@ def fig3b(folder: FilePath, columns: int = 51) -> list[Path]:
     """
     b = np.linspace(0.5, 1.0, _checked(columns))
     ratio = np.array([packing_ratio(ellipse(c), MAP_POINTS) for c in b])
+    held = np.array([stiffness_released(ellipse(c)) for c in b])
     figure = _curve_figure(b, ratio)
-    return _written(folder, "fig3b", figure, {"b_over_a": b, "packing_ratio": ratio})
+    columns_of = {"b_over_a": b, "packing_ratio": ratio, "stays_folded": held > 0.0}
+    return _written(folder, "fig3b", figure, columns_of)
 
 
 def fig6(folder: FilePath, columns: int = 49) -> list[Path]:
@@ -73,11 +79,12 @@ def fig6(folder: FilePath, columns: int = 49) -> list[Path]:
         for c, radii in RECTANGLES.items()
         for r in radii
     ]
-    figure = _map_figure(b, r, ratio, marks, "$b/a,\\ r/a$")
+    held = np.vectorize(lambda b, r: stiffness_released(rectangle(b, r)))(b, r)
+    figure = _map_figure(b, r, (ratio, held), marks, "$b/a,\\ r/a$")
     axes = figure.axes[0]
     style.label_axes(axes, "aspect ratio  $b/a$", "fillet radius  $r/a$", fontsize=10)
     axes.text(0.27, 0.72, "$r > b$: no such ring", fontsize=8.5, color=QUIET)
-    columns_of = {"b_over_a": b, "r_over_a": r, "packing_ratio": ratio}
+    columns_of = {"b_over_a": b, "r_over_a": r, "packing_ratio": ratio, "stays_folded": held > 0.0}
     return _written(folder, "fig6", figure, columns_of)
 
 
@@ -100,14 +107,26 @@ def fig9(folder: FilePath, columns: int = 22) -> list[Path]:
         for d, radii in TRIANGLES.items()
         for r in radii
     ]
-    figure = _map_figure(degrees, r, ratio, marks, "$\\alpha_T,\\ r/a$", LABELS)
+    held = np.vectorize(lambda d, r: stiffness_released(triangle(math.radians(d), r)))(degrees, r)
+    figure = _map_figure(degrees, r, (ratio, held), marks, "$\\alpha_T,\\ r/a$", LABELS)
     axes = figure.axes[0]
     across = "vertex angle  $\\alpha_T$  (degrees)"
     style.label_axes(axes, across, "fillet radius  $r/a$", fontsize=10)
     axes.set_xticks(range(30, 121, 15))
     axes.text(84, 0.29, "$r > R_C$: no such ring", fontsize=8.5, color=QUIET)
     columns_of = {"vertex_angle": degrees, "r_over_a": r, "packing_ratio": ratio}
+    columns_of["stays_folded"] = held > 0.0
     return _written(folder, "fig9", figure, columns_of)
+
+
+def stiffness_released(ring: Ring) -> float:
+    """Return the least stiffness of the folded ring without grips: positive where it stays so.
+
+    See `der.bvp.released.stiffnesses`; continuous where it vanishes.
+    """
+    state = planar_shape(ring, rectangular_section(H_OVER_T, NU))
+    least = abs(min(stiffnesses(state)))
+    return least if index_free(state) == 0 else -least
 
 
 class _Mark(NamedTuple):
@@ -145,7 +164,7 @@ def _written(folder: FilePath, name: str, figure: Figure, table: dict[str, Array
 def _curve_figure(b: Array, ratio: Array) -> Figure:
     """Packing ratio against b/a, below the folded shapes of some ellipses."""
     figure = canvas.page(6.6, 4.6)
-    axes = figure.add_axes((0.11, 0.12, 0.86, 0.56))
+    axes = figure.add_axes((0.11, 0.18, 0.86, 0.5))
     axes.plot(b, ratio, color=FOLDED, linewidth=1.8, zorder=2)
     axes.axhline(1 / 9, color=QUIET, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     axes.text(0.5, 1 / 9 + 0.004, "circle, 1/9", fontsize=8.5, color=QUIET, va="bottom")
@@ -162,33 +181,52 @@ def _curve_figure(b: Array, ratio: Array) -> Figure:
         _draw_shapes(inset, ring)
         figure.text(centre, 0.955, f"{height:.3f}", ha="center", fontsize=9, color=INK)
     figure.text(0.012, 0.955, "ratio", fontsize=9, color=QUIET)
+    _say_released(figure, 0.54, "")
     return figure
+
+
+def _say_released(figure: Figure, x: float, also: str) -> None:
+    """Say what the colours of the shapes mean."""
+    look: dict[str, Any] = {"ha": "center", "fontsize": 7.6}
+    figure.text(x, 0.042, f"blue: stays folded {RELEASED}", color=FOLDED, **look)
+    figure.text(x, 0.01, f"vermilion{also}: opens {RELEASED}", color=OPENS, **look)
 
 
 def _map_figure(
     x: Array,
     y: Array,
-    ratio: Array,
+    values: tuple[Array, Array],
     marks: Sequence[_Mark],
     what: str,
     labels_at: Sequence[tuple[float, float]] = (),
 ) -> Figure:
-    """Contours of the packing ratio, beside the folded shapes of the rings that are marked."""
+    """Contours of the packing ratio, beside the folded shapes of the rings that are marked.
+
+    Parameters
+    ----------
+    values : packing ratio, and stiffness when released: hatched where that is not positive
+    """
+    ratio, held = values
     figure = canvas.page(9.2, 4.9)
     axes = figure.add_axes((0.065, 0.115, 0.465, 0.835))
     _contours(axes, x, y, ratio, labels_at)
+    if held.min() < 0.0:
+        lowest = 2.0 * float(held.min())
+        axes.contourf(x, y, held, levels=[lowest, 0.0], colors="none", hatches=["////"])
+        axes.contour(x, y, held, levels=[0.0], colors=INK, linewidths=1.2)
     for k, mark in enumerate(marks):
         axes.plot(*mark.at, clip_on=False, **DOT)
         # to the left of the last point of the map
         away = (-7.5 if mark.at[0] == np.max(x) else 6.5, 6.5)
         style.annotate(axes, mark.at, LETTERS[k], away, ha="center", fontsize=9, fontweight="bold")
-        left, bottom = 0.635 + 0.182 * (k % 2), 0.745 - 0.233 * (k // 2)
-        _draw_shapes(figure.add_axes((left, bottom, 0.175, 0.165)), mark.ring)
+        left, bottom = 0.635 + 0.182 * (k % 2), 0.763 - 0.224 * (k // 2)
+        _draw_shapes(figure.add_axes((left, bottom, 0.175, 0.155)), mark.ring)
         value = packing_ratio(mark.ring, MAP_POINTS)
         caption = rf"$\bf{{{LETTERS[k]}}}$  {mark.label}:  {value:.2f}"
-        figure.text(left + 0.0875, bottom + 0.18, caption, ha="center", fontsize=8.5, color=INK)
+        figure.text(left + 0.0875, bottom + 0.166, caption, ha="center", fontsize=8.5, color=INK)
     about = figure.text(0.8135, 0.972, f"ring ({what}): packing ratio", color=QUIET, fontsize=8.5)
     about.set(ha="center", va="center")
+    _say_released(figure, 0.8135, ", hatched")
     return figure
 
 
@@ -212,12 +250,16 @@ def _contours(
 
 
 def _draw_shapes(axes: Axes, ring: Ring) -> None:
-    """Draw the folded ring inside its flat outline, in one scale, about one centre."""
+    """Draw the folded ring inside its flat outline, in one scale, about one centre.
+
+    The colour says whether it stays folded when released.
+    """
     s = np.linspace(0.0, ring.length, SHAPE_POINTS + 1)
     flat = ring.position(s)[:, 1:]
     points = folded(ring, SHAPE_POINTS).points
     points = np.append(points, points[:1], axis=0)
-    for curve, colour, width in ((flat, FLAT, 0.9), (points, FOLDED, 1.1)):
+    folds = FOLDED if stiffness_released(ring) > 0.0 else OPENS
+    for curve, colour, width in ((flat, FLAT, 0.9), (points, folds, 1.1)):
         axes.plot(*(curve - rings.box_middle(curve)).T, color=colour, linewidth=width)
     axes.set_aspect("equal")
     axes.set_axis_off()

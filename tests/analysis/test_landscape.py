@@ -21,6 +21,7 @@ from der.analysis.request import Request
 from der.records.barriers import BarrierCurves
 from der.records.energy_surface import Surface
 from der.records.landscape import Landscape, Pass
+from der.records.text import summary
 from der.viz.plots.style import save
 
 
@@ -60,6 +61,13 @@ def test_json_of_a_landscape(tmp_path):
     low = json.loads(along(3.0).to_json())
     assert low["barriers"]["open"] is None
     assert len(low["why"]["open"]) > 20
+
+
+def test_text_says_what_the_barrier_is_worth_without_grips():
+    """An ellipse of h/t = 3 has a barrier to open in its grips, and opens when released."""
+    opens = summary(landscape(scene(3.0, der.ellipse(0.6))))
+    assert "stays folded when released: no, index 1: this barrier holds in the grips only" in opens
+    assert "stays folded when released: yes" in summary(along())
 
 
 def test_a_path_that_does_not_fold_has_no_barriers():

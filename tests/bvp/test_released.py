@@ -11,7 +11,7 @@ from shapes import scene
 
 import der
 from der.bvp.collocation import collocation
-from der.bvp.released import index_free, planar, stiffnesses
+from der.bvp.released import index_free, planar, planar_shape, stiffnesses
 from der.bvp.sectors import sector
 from der.bvp.solve import solve_with_points
 
@@ -130,3 +130,18 @@ def rings(draw):
         b = 0.3 + 0.7 * draw.random()
         yield der.rectangle(b, b * (0.4 + 0.6 * draw.random()))
         yield der.triangle(math.radians(70.0 + 50.0 * draw.random()), 0.05 + 0.08 * draw.random())
+
+
+def test_the_planar_rod_leads_to_the_same_threshold():
+    """Without a path: squares stay folded at h/t = 4 from r/a = 0.8967 on (FINDINGS.md, 7).
+
+    And a triangle, which is bent by a force, from the h/t of the path's folded state.
+    """
+
+    def least(ring, h_over_t):
+        return min(stiffnesses(planar_shape(ring, der.rectangular_section(h_over_t))))
+
+    square = brentq(lambda r: least(der.rectangle(1.0, r), 4.0), 0.85, 0.95, xtol=1e-6)
+    assert square == pytest.approx(0.8967, abs=1e-4)
+    obtuse = brentq(lambda h_over_t: least(OBTUSE, h_over_t), 6.0, 6.2, xtol=1e-10)
+    assert obtuse == pytest.approx(threshold(OBTUSE, 6.0, 6.2), abs=1e-7)

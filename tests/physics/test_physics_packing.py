@@ -124,13 +124,13 @@ def test_number_of_points_is_checked(n):
 @pytest.mark.parametrize(
     ("figure", "name", "header", "last"),
     [
-        (fig3b, "fig3b", "b_over_a,packing_ratio", [1.0, 1 / 9]),
-        (fig6, "fig6", "b_over_a,r_over_a,packing_ratio", [1.0, 1.0, 1 / 9]),
+        (fig3b, "fig3b", "b_over_a,packing_ratio,stays_folded", [1.0, 1 / 9, 1.0]),
+        (fig6, "fig6", "b_over_a,r_over_a,packing_ratio,stays_folded", [1.0, 1.0, 1 / 9, 1.0]),
         (
             fig9,
             "fig9",
-            "vertex_angle,r_over_a,packing_ratio",
-            [120.0, np.tan(np.pi / 12) / 2, 1 / 9],
+            "vertex_angle,r_over_a,packing_ratio,stays_folded",
+            [120.0, np.tan(np.pi / 12) / 2, 1 / 9, 1.0],
         ),
     ],
 )

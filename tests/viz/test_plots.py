@@ -175,7 +175,7 @@ def test_title_names_ring_section_edges_and_mode():
     title = draw(path()).texts[0].get_text()
     for part in ("ellipse, b/a = 0.85, about y", "h/t = 1.6", "0.3", "32 edges"):
         assert part in title
-    assert title.endswith("foldable, stable at fixed M, released: unknown, snap-back")
+    assert title.endswith("stable at fixed M, released: unknown, snap-back")
 
 
 def test_title_of_an_incomplete_path_says_so():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from der.records.comparison import AGREED, Comparison
-from der.records.text.path import ONE_ARM
+from der.records.text.path import ONE_ARM, mode_text
 from der.records.text.table import form, table
 from der.records.units import unit
 
@@ -36,10 +36,15 @@ def lines(found: Comparison) -> list[str]:
             f"{pair.kind:8}{pair.rod_gamma:12.8f}{'':14}{pair.bvp_gamma:12.8f} by bvp: "
             f"{pair.difference:.1e} rad apart{bar}"
         )
-    in_moment, in_energy = found.largest
-    told.append(
-        f"largest normal distance: {in_moment:.1e} in M, {in_energy:.1e} in U (scaled planes)"
-    )
+    told += _agreement(found)
+    both = {"rod": found.rod.mode, "bvp": found.bvp.mode}
+    return told + [f"{name}: {mode_text(mode)}" for name, mode in both.items() if mode is not None]
+
+
+def _agreement(found: Comparison) -> list[str]:
+    """How far the curves are apart, and how many states are inside their error bars."""
+    moment, energy = found.largest
+    told = [f"largest normal distance: {moment:.1e} in M, {energy:.1e} in U (scaled planes)"]
     if not math.isnan(found.within):
         told.append(f"{100 * found.within:.1f} % of the states agree within their error bars")
     if found.disagrees:

@@ -99,9 +99,9 @@ def _reach(path: Path) -> str:
 
 
 def _mode(mode: Mode) -> str:
-    """The folding mode as text: "foldable, stays folded when released, snap-through"."""
+    """The folding mode as text: "stays folded when released, snap-through"."""
     snap = "no snap" if mode.snapping == "none" else mode.snapping
-    return f"foldable, {folded_text(mode)}, {snap}" if mode.foldable else f"not foldable, {snap}"
+    return f"{folded_text(mode) if mode.foldable else 'not foldable'}, {snap}"
 
 
 def _entries(path: Path) -> list[Any]:
