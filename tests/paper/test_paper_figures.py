@@ -91,7 +91,7 @@ def test_curves_are_written_as_picture_and_table(fig11):
     assert list(rows[0]) == [*RING, *STATE, "point"]
     assert all(name in words[1] for name in [*RING, *STATE, "point"])
     assert "not foldable" in words[2]
-    assert "stable, snap-back" in words[2]
+    assert "stable at fixed M, opens when released, snap-back" in words[2]
     assert {row["vertex_angle"] for row in rows} == {"120.0", "90.0"}
 
 
