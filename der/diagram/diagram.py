@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FAMILIES", "PhaseDiagram", "phase_diagram"]
 
-STORE = "cases.jsonl"
+STORE = "cases.sqlite"
 SAMPLE = 40
 
 Entries: TypeAlias = dict[str, Any]  # of a line of a table, by column; others are left out
@@ -104,9 +104,9 @@ def phase_diagram(
 ) -> PhaseDiagram:
     """The phase diagram of a family of rings, written to a folder.
 
-    Every finished case is in `cases.jsonl` at once, so that a run that is stopped and resumed loses
-    only the cases in flight. Afterwards `cases.csv`, `boundaries.csv`,
-    `corners.csv`, NAME.png, and `check.csv` are written.
+    Every finished case is in `cases.sqlite` at once, so that a run that is stopped and resumed
+    loses only the cases in flight. Afterwards `cases.csv`, `boundaries.csv`, `corners.csv`,
+    NAME.png, and `check.csv` are written.
 
     Parameters
     ----------

@@ -1,23 +1,29 @@
-"""Finished cases on disk: one line of JSON each, appended and synced, so that none is lost."""
+"""Finished cases on disk: an SQLite database, in which each is complete or absent."""
 
 from __future__ import annotations
 
-import fcntl
+import errno
 import json
-import os
-from collections.abc import Iterable
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path as File
 from typing import Self
 
 from der.diagram.cases import Row
 from der.utils.files import FilePath
 
+SCHEMA = "CREATE TABLE cases (key TEXT PRIMARY KEY, row TEXT NOT NULL) WITHOUT ROWID"
+IN_USE = ("SQLITE_BUSY", "SQLITE_LOCKED")
+
 
 class Store:
-    """The rows of finished cases by key, in memory and in a file that only grows.
+    """The rows of finished cases by key, in memory and in a file; one process at a time.
 
-    An incomplete line, after a crash or on a full disk, is cut off when the file is opened.
-    One process at a time.
+    SQLite syncs each change before it counts and takes back one that is incomplete, after a crash
+    or on a full disk. A new store takes over the cases of an older version's: the file of the same
+    name that ends in .jsonl, a case a line.
 
     Parameters
     ----------
@@ -26,7 +32,7 @@ class Store:
     Raises
     ------
     ValueError
-        If another process has the file open.
+        If another process has the file open, or it is no store.
     OSError
         If it cannot be read or written.
     """
@@ -34,19 +40,26 @@ class Store:
     def __init__(self, file: FilePath) -> None:
         self.file = File(file)
         self.rows: dict[str, Row] = {}
-        self._open = os.open(self.file, os.O_RDWR | os.O_CREAT, 0o666)
+        with self._named():
+            self._open = sqlite3.connect(self.file, timeout=0.0)
         try:
-            self._lock()
-            self._read()
+            with self._named():
+                self._open.text_factory = partial(str, encoding="utf-8", errors="replace")
+                self._lock()
+                lines = self._open.execute("SELECT row FROM cases").fetchall()
+            self.rows.update(_readable(line for (line,) in lines))
+            if not lines and (older := self.file.with_suffix(".jsonl")).is_file():
+                with older.open(encoding="utf-8", errors="replace") as content:
+                    self.add(dict(_readable(content)).values())
         except BaseException:
-            os.close(self._open)
+            self._open.close()
             raise
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        os.close(self._open)
+        self._open.close()
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -54,7 +67,7 @@ class Store:
     @property
     def safe(self) -> int:
         """How many cases are on disk: at Ctrl-C in the midst of `add`, more than are in `rows`."""
-        return self.file.read_bytes().count(b"\n")
+        return int(self._open.execute("SELECT count(*) FROM cases").fetchone()[0])
 
     def add(self, rows: Iterable[Row]) -> None:
         """Keep rows, on disk before anything else happens.
@@ -64,43 +77,47 @@ class Store:
         OSError
             If they cannot be written, on a full disk for one; what was there before is unharmed.
         """
-        rows = list(rows)
+        new = {row.case.key: row for row in rows}
         lines = [
-            json.dumps({"key": row.case.key, **row.to_json()}, allow_nan=False) + "\n"
-            for row in rows
+            (key, json.dumps({"key": key, **row.to_json()}, allow_nan=False))
+            for key, row in new.items()
         ]
-        try:
-            self._write("".join(lines).encode())
-        except OSError as problem:
-            os.ftruncate(self._open, self._end)
-            raise OSError(
-                problem.errno, f"{problem.strerror}; {len(self)} cases are safe", str(self.file)
-            ) from problem
-        self.rows.update((row.case.key, row) for row in rows)
+        with self._named(), self._open:  # a transaction
+            self._open.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?)", lines)
+        self.rows.update(new)
 
     def _lock(self) -> None:
+        """Keep other processes out until the end, and make the table unless it is there."""
+        self._open.execute("PRAGMA locking_mode = EXCLUSIVE")
+        self._open.execute("BEGIN EXCLUSIVE")
+        tables = self._open.execute("SELECT sql FROM sqlite_master").fetchall()
+        if not tables:
+            self._open.execute(SCHEMA)
+        elif tables != [(SCHEMA,)]:  # a stranger's views and triggers would run as programs
+            raise ValueError(f"{self.file} is no store of cases")
+        self._open.commit()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Give an error of SQLite as one that names the file."""
         try:
-            fcntl.flock(self._open, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ValueError(f"{self.file} is in use by another run") from None
+            yield
+        except sqlite3.Error as problem:
+            code = getattr(problem, "sqlite_errorname", "")
+            if code in IN_USE:
+                raise ValueError(f"{self.file} is in use by another run") from None
+            if code in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
+                raise ValueError(f"{self.file} is no store of cases: {problem}") from None
+            number = errno.ENOSPC if code == "SQLITE_FULL" else errno.EIO
+            words = f"{problem}; {len(self)} cases are safe"
+            raise OSError(number, words, str(self.file)) from problem
 
-    def _read(self) -> None:
-        """Read all complete lines, and cut off the rest."""
-        content = self.file.read_bytes()
-        self._end = content.rfind(b"\n") + 1
-        os.ftruncate(self._open, self._end)
-        for line in content[: self._end].splitlines():
-            try:
-                entries = json.loads(line)
-                key = entries.pop("key")
-                self.rows[key] = Row.from_json(entries)
-            except (ValueError, KeyError, TypeError, AttributeError):
-                continue  # the case of a line that cannot be read is solved again
 
-    def _write(self, content: bytes) -> None:
-        os.lseek(self._open, self._end, os.SEEK_SET)
-        rest = memoryview(content)
-        while rest:
-            rest = rest[os.write(self._open, rest) :]
-        os.fsync(self._open)
-        self._end += len(content)
+def _readable(lines: Iterable[str]) -> Iterator[tuple[str, Row]]:
+    """Rows with their keys; the case of a line that cannot be read is solved again."""
+    for line in lines:
+        try:
+            entries = json.loads(line)
+            yield entries.pop("key"), Row.from_json(entries)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            continue

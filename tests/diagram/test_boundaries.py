@@ -59,7 +59,7 @@ def about_y(tmp_path_factory):
     of = family("fig3a", ranges={"b_over_a": (0.75, 1.0), "h_over_t": (1.4, 4.0)}, finest=8)
     of = replace(of, sheets=("y",), coarse=8)
     crew = SimpleNamespace(executor=ThreadPoolExecutor(1), width=1)
-    with Store(tmp_path_factory.mktemp("about_y") / "c.jsonl") as store:
+    with Store(tmp_path_factory.mktemp("about_y") / "c.sqlite") as store:
         found = scan(of, store, crew, progress=False)
         return AboutY(found, *follow(found, store, crew, solve_case))
 

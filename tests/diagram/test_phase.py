@@ -39,7 +39,7 @@ THRESHOLDS = {"foldability": 1.5076, "snap-back": 1.8396, "stability": 3.4699}  
 
 def scanned(of, folder, solve=None):
     options = {} if solve is None else {"solve": solve}
-    with Store(folder / "cases.jsonl") as store:
+    with Store(folder / "cases.sqlite") as store:
         return scan(of, store, Here(1), progress=False, **options)
 
 
@@ -78,7 +78,7 @@ def test_files_are_written(diagram, folder):
     """Tables and picture; the store beside them."""
     names = {file.name for file in diagram.files}
     assert names == {"cases.csv", "boundaries.csv", "corners.csv", "check.csv", "fig3a.png"}
-    assert {file.name for file in folder.iterdir()} == names | {"cases.jsonl"}
+    assert {file.name for file in folder.iterdir()} == names | {"cases.sqlite"}
     assert (folder / "fig3a.png").read_bytes().startswith(FORMAT)
 
 

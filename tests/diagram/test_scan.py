@@ -5,11 +5,13 @@ import json
 import math
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,7 +37,7 @@ from der.diagram.distributed import follow
 from der.diagram.families import family
 from der.diagram.jobs import AHEAD
 from der.diagram.scan import BATCH, Interrupted, corners, scan, solve_all
-from der.diagram.store import Store
+from der.diagram.store import SCHEMA, Store
 from der.diagram.workers import Cluster, Processes, workers
 from validation.stress.kill_and_resume import Killed, calm, kill, kill_and_resume, notes
 
@@ -78,7 +80,7 @@ def timeless(rows):
 def test_scan_finds_what_a_full_grid_finds(tmp_path):
     """All cells of the finest level that the boundary crosses, with a quarter of the cases."""
     of = family("fig3a", finest=64)
-    found = scanned(of, tmp_path / "cases.jsonl", Here())
+    found = scanned(of, tmp_path / "cases.sqlite", Here())
     labels = {
         (sheet, (i, j)): toy(of.case(sheet, (i / 64, j / 64))).label
         for sheet in of.sheets
@@ -97,7 +99,7 @@ def test_scan_finds_what_a_full_grid_finds(tmp_path):
 
 def test_cells_tile_the_diagram(tmp_path):
     """Every unit of area once; nothing is refined twice."""
-    found = scanned(family("fig3a", finest=64), tmp_path / "cases.jsonl", Here())
+    found = scanned(family("fig3a", finest=64), tmp_path / "cases.sqlite", Here())
     assert sum(edge**2 for _, edge in found.cells) == 2 * 64**2
 
 
@@ -108,7 +110,7 @@ def test_cube_is_scanned_too(tmp_path):
         far = math.dist((case.vertex_angle / 90, case.h_over_t / 3), (0.8, 0.8))
         return Row(case, "unfoldable" if far < 0.25 else "stable at fixed moment, snap-back")
 
-    found = scanned(family("fig8a", finest=16), tmp_path / "cases.jsonl", Here(), ball)
+    found = scanned(family("fig8a", finest=16), tmp_path / "cases.sqlite", Here(), ball)
     assert sum(edge**3 for _, edge in found.cells) == 16**3
     assert 9**3 < len(found.rows) < 17**3
 
@@ -123,7 +125,7 @@ def test_failed_cases_are_rows_and_refine_nothing(tmp_path):
 
     found = scanned(
         family("fig3a", finest=32, ranges={"b_over_a": (0.95, 1.0)}),
-        tmp_path / "cases.jsonl",
+        tmp_path / "cases.sqlite",
         Here(),
         fails,
     )
@@ -133,14 +135,14 @@ def test_failed_cases_are_rows_and_refine_nothing(tmp_path):
 
 def test_rows_do_not_depend_on_order(tmp_path):
     """1 or 5 threads that finish in any order."""
-    one, five = (scanned(TOY, tmp_path / f"{n}.jsonl", Threads(n)) for n in (1, 5))
+    one, five = (scanned(TOY, tmp_path / f"{n}.sqlite", Threads(n)) for n in (1, 5))
     assert timeless(one.sorted_rows) == timeless(five.sorted_rows)
     assert one.cells == five.cells
 
 
 def test_finer_scan_goes_on_with_the_cases_of_a_coarser(tmp_path, told):
     """No case twice."""
-    file = tmp_path / "cases.jsonl"
+    file = tmp_path / "cases.sqlite"
     first = scanned(TOY, file, Here(), toy_with_notes)
     second = scanned(family("fig3a", finest=64), file, Here(), toy_with_notes)
     keys = told.read_text().split()
@@ -151,32 +153,47 @@ def test_finer_scan_goes_on_with_the_cases_of_a_coarser(tmp_path, told):
 # --- The store -------------------------------------------------------------------------------
 
 
-def test_torn_last_line_is_cut_off(tmp_path):
-    """What is left of it would else spoil the next line, too."""
-    file = tmp_path / "cases.jsonl"
-    scanned(TOY, file, Here())
-    complete = file.read_bytes()
-    file.write_bytes(complete[:-40])
-    again = scanned(TOY, file, Here())
-    assert again.solved == 1
-    assert [json.loads(line)["key"] for line in file.read_bytes().splitlines()] == [
-        json.loads(line)["key"] for line in complete.splitlines()
-    ]
+def test_change_cut_short_by_a_crash_is_taken_back(tmp_path):
+    """A journal beside the store, as `kill -9` leaves it in the midst of a change."""
+    file, killed = tmp_path / "cases.sqlite", tmp_path / "killed.sqlite"
+    cases = [row.case for row in scanned(TOY, file, Here()).sorted_rows]
+    other = [replace(toy(case), message="x" * 2000) for case in cases]
+    with Store(file) as store, suppress(KeyboardInterrupt):
+        store._open.execute("PRAGMA cache_size = 1")  # so that pages go to the disk before the end
+
+        def rows():
+            yield from other
+            journal = tmp_path / "cases.sqlite-journal"
+            killed.write_bytes(file.read_bytes())
+            journal_of_killed = tmp_path / "killed.sqlite-journal"
+            journal_of_killed.write_bytes(journal.read_bytes())
+            raise KeyboardInterrupt
+
+        lines = ((row.case.key, json.dumps(row.to_json())) for row in rows())
+        with store._open:
+            store._open.executemany("INSERT OR REPLACE INTO cases VALUES (?, ?)", lines)
+    assert b"x" * 500 in killed.read_bytes()
+    for one in (file, killed):
+        with Store(one) as store:
+            assert len(store) == store.safe == len(cases)
+            assert not any(row.message for row in store.rows.values())
+    assert sorted(tmp_path.iterdir()) == [file, killed]
 
 
-def test_unreadable_line_is_a_case_that_is_solved_again(tmp_path):
-    """A bad block costs its own cases only."""
-    file = tmp_path / "cases.jsonl"
+def test_unreadable_row_is_a_case_that_is_solved_again(tmp_path):
+    """A bad row costs its own case only."""
+    file = tmp_path / "cases.sqlite"
     scanned(TOY, file, Here())
-    lines = file.read_bytes().splitlines(keepends=True)
-    lines[3], lines[7], lines[9] = b"\x00\xff\n", b"[]\n", b'{"key": "a", "case": 3}\n'
-    file.write_bytes(b"".join(lines))
+    with Store(file) as store, store._open as opened:
+        keys = sorted(store.rows)
+        for key, row in zip(keys[:3], (b"\x00\xff", "[]", '{"key": "a", "case": 3}'), strict=True):
+            opened.execute("UPDATE cases SET row = CAST(? AS TEXT) WHERE key = ?", (row, key))
     assert scanned(TOY, file, Here()).solved == 3
 
 
 def test_store_is_in_use_by_one_run_at_a_time(tmp_path):
-    """Two would solve everything twice, and cut each other's lines."""
-    file = tmp_path / "cases.jsonl"
+    """Two would solve everything twice."""
+    file = tmp_path / "cases.sqlite"
     with Store(file), pytest.raises(ValueError, match="is in use by another run"):
         Store(file)
     with Store(file):
@@ -184,27 +201,59 @@ def test_store_is_in_use_by_one_run_at_a_time(tmp_path):
 
 
 def test_full_disk_loses_only_the_cases_in_flight(tmp_path, monkeypatch):
-    """A disk that takes half a line: the error says what is safe, and the half is cut off."""
-    file = tmp_path / "cases.jsonl"
-    write, room = os.write, [20_000]
+    """The error says what is safe."""
+    file = tmp_path / "cases.sqlite"
 
-    def full(where, content):
-        taken = write(where, bytes(content)[: room[0]])
-        room[0] -= taken
-        if taken == 0:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return taken
+    class Small(Store):
+        def _lock(self):
+            super()._lock()
+            self._open.execute("PRAGMA max_page_count = 8")
 
-    monkeypatch.setattr("der.diagram.store.os.write", full)
-    with pytest.raises(OSError, match=r"No space left on device; (\d+) cases are safe") as caught:
-        scanned(TOY, file, Here())
-    monkeypatch.undo()
+    with Small(file) as store:
+        with pytest.raises(OSError, match=r"disk is full; (\d+) cases are safe") as caught:
+            scan(TOY, store, Here(), solve=toy, progress=False)
+        safe = store.safe
+        assert safe == len(store) > 0
     assert caught.value.errno == errno.ENOSPC
-    lines = file.read_text().splitlines()
-    assert 0 < len(lines) == len([json.loads(line) for line in lines])
-    assert 20_000 - file.stat().st_size < 400 * BATCH
+    assert f"{safe} cases" in str(caught.value)
     again = scanned(TOY, file, Here())
-    assert again.solved == len(again.sorted_rows) - len(lines)
+    assert again.solved == len(again.sorted_rows) - safe
+
+
+def test_cases_of_an_older_version_are_taken_over(tmp_path, undisturbed):
+    """It kept lines of JSON, of which the last one may be torn."""
+    rows = undisturbed.sorted_rows
+    lines = [json.dumps({"key": row.case.key, **row.to_json()}) for row in rows]
+    older = "\n".join(["\x00", "[" * 10_000, *lines])[:-40]
+    (tmp_path / "cases.jsonl").write_text(older)
+    assert scanned(TOY, tmp_path / "cases.sqlite", Here()).solved == 1
+    assert scanned(TOY, tmp_path / "cases.sqlite", Here()).solved == 0
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda file: file.write_text("{}\n" * 1000),
+        lambda file: spoilt(file, "CREATE TABLE cases (key, row)"),
+        lambda file: spoilt(file, "CREATE VIEW cases AS SELECT 'a' AS row"),
+        lambda file: spoilt(file, SCHEMA, "CREATE TRIGGER t INSERT ON cases BEGIN SELECT 1; END"),
+    ],
+)
+def test_file_that_is_no_store_is_refused(tmp_path, make):
+    """Nor are a stranger's views and triggers run."""
+    file = tmp_path / "cases.sqlite"
+    make(file)
+    before = file.read_bytes()
+    with pytest.raises(ValueError, match="is no store of cases"):
+        Store(file)
+    assert file.read_bytes() == before
+
+
+def spoilt(file, *statements):
+    """A database of a stranger."""
+    with closing(sqlite3.connect(file)) as database, database:
+        for statement in statements:
+            database.execute(statement)
 
 
 # --- Workers that die ------------------------------------------------------------------------
@@ -212,13 +261,13 @@ def test_full_disk_loses_only_the_cases_in_flight(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    return scanned(TOY, tmp_path_factory.mktemp("undisturbed") / "cases.jsonl", Here())
+    return scanned(TOY, tmp_path_factory.mktemp("undisturbed") / "cases.sqlite", Here())
 
 
 def test_worker_that_is_killed_is_replaced(tmp_path, told, undisturbed):
     """kill -9 of one of two; the run goes on, and its cases are solved after all."""
     with workers(2) as crew:
-        found = scanned(TOY, tmp_path / "cases.jsonl", crew, toy_that_dies_once)
+        found = scanned(TOY, tmp_path / "cases.sqlite", crew, toy_that_dies_once)
     assert told.exists()
     assert timeless(found.sorted_rows) == timeless(undisturbed.sorted_rows)
 
@@ -227,7 +276,7 @@ def test_case_that_kills_its_workers_is_a_failed_row(tmp_path, undisturbed):
     """And no other: those that died with it are tried again alone."""
     assert POISON in {row.case for row in undisturbed.sorted_rows}
     with workers(2) as crew:
-        found = scanned(TOY, tmp_path / "cases.jsonl", crew, toy_with_poison)
+        found = scanned(TOY, tmp_path / "cases.sqlite", crew, toy_with_poison)
     bad = [row for row in found.sorted_rows if not row.ok]
     assert [(row.case, row.message) for row in bad] == [(POISON, "its worker died, 2 times")]
 
@@ -242,7 +291,7 @@ def test_case_that_kills_its_workers_is_a_failed_row(tmp_path, undisturbed):
 def test_worker_killed_on_a_boundary_is_replaced(tmp_path, told, monkeypatch, work, kinds):
     """Every slice of a cube has its curves, in order; one that kills has what the scan sees."""
     monkeypatch.setattr("der.diagram.distributed._follow", work)
-    with Store(tmp_path / "cases.jsonl") as store, workers(2) as crew:
+    with Store(tmp_path / "cases.sqlite") as store, workers(2) as crew:
         found = scan(CUBE, store, Here(), solve=wedge, progress=False)
         before = len(store)
         curves = follow(found, store, crew, wedge).curves
@@ -255,7 +304,7 @@ def test_worker_killed_on_a_boundary_is_replaced(tmp_path, told, monkeypatch, wo
 def test_workers_that_cannot_work_end_the_run(tmp_path):
     """Not a folder full of failed rows."""
     cases = [TOY.case("x", (i / 16, 0.0)) for i in range(16)]
-    with Store(tmp_path / "cases.jsonl") as store, workers(1) as crew:
+    with Store(tmp_path / "cases.sqlite") as store, workers(1) as crew:
         with pytest.raises(RuntimeError, match="workers die before they have solved anything"):
             solve_all(cases, store, crew, solve=deadly)
         assert len(store) == 0
@@ -268,7 +317,7 @@ import sys
 sys.path[:0] = [{root!r}, {tests!r}]
 from toy_cases import TOY, slow
 from der.diagram.scan import Interrupted, scan
-from der.diagram.store import Store
+from der.diagram.store import SCHEMA, Store
 from der.diagram.workers import workers
 
 if __name__ == "__main__":
@@ -280,19 +329,46 @@ if __name__ == "__main__":
 """
 
 
-def run(folder):
+def run(folder, **env):
     """A run in a process of its own."""
-    file = folder / "cases.jsonl"
+    file = folder / "cases.sqlite"
     script = folder / "run.py"
     script.write_text(SCRIPT.format(root=str(TESTS.parent), tests=str(TESTS), file=str(file)))
     return subprocess.Popen(
-        [sys.executable, str(script)], stderr=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, str(script)],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=os.environ | env,
     )
 
 
+@pytest.fixture
+def no_unix(tmp_path):
+    """A folder which, on the path, hides the modules that Windows has not."""
+    folder = tmp_path / "windows"
+    folder.mkdir()
+    for name in ("fcntl", "grp", "pty", "pwd", "resource", "termios", "tty"):
+        (folder / f"{name}.py").write_text("raise ImportError(__name__)\n")
+    return str(folder)
+
+
+def test_stores_and_workers_need_no_module_of_unix_alone(tmp_path, told, no_unix, undisturbed):
+    """A scan by workers, all of whose processes lack fcntl and its like."""
+    process = run(tmp_path, PYTHONPATH=no_unix)
+    _, words = process.communicate(timeout=60)
+    assert (process.returncode, words) == (0, "")
+    with Store(tmp_path / "cases.sqlite") as store:
+        found = scan(TOY, store, Here(), solve=toy, progress=False)
+    assert found.solved == 0
+    assert timeless(found.sorted_rows) == timeless(undisturbed.sorted_rows)
+
+
 def wait_for(file, lines, process):
-    """Until a file has so many lines."""
-    while not file.exists() or file.read_bytes().count(b"\n") < lines:
+    """Until a store has so many cases, about."""
+    while (
+        not file.exists() or file.read_bytes().count(b'"label"') < lines
+    ):  # its run alone opens it
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.01)
 
@@ -303,25 +379,26 @@ def test_killed_twice_and_resumed_is_as_if_nothing_had_been(tmp_path, told, undi
     In flight are at most two tasks each of two workers. The command
     `validation.stress.kill_and_resume` does it twenty times to a real diagram.
     """
-    file = tmp_path / "cases.jsonl"
+    file = tmp_path / "cases.sqlite"
     moments = [lambda process, n=lines: wait_for(file, n, process) for lines in (40, 100)]
     flight = kill_and_resume(lambda: run(tmp_path), moments, file, told)
     assert len(flight) == 2
     assert all(0 <= lost <= 2 * AHEAD * BATCH for lost in flight)
     with Store(file) as store:
         found = scan(TOY, store, Here(), solve=toy, progress=False)
+        stored = len(store)
     assert found.solved == 0
     assert timeless(found.sorted_rows) == timeless(undisturbed.sorted_rows)
     times = notes(told)
     assert set(times) == {row.case.key for row in undisturbed.sorted_rows}
     assert times.total() - len(times) == sum(flight)
-    assert file.read_bytes().count(b"\n") == len(times)
+    assert stored == len(times)
 
 
 def test_workers_leave_when_their_parent_is_killed(tmp_path, told):
     """They would wait for ever for tasks that no process sends."""
     process = run(tmp_path)
-    wait_for(tmp_path / "cases.jsonl", 20, process)
+    wait_for(tmp_path / "cases.sqlite", 20, process)
     assert kill(process, workers_too=False)
     assert calm(told)
 
@@ -340,12 +417,12 @@ def test_killed_run_that_differs_is_not_ok():
 def test_ctrl_c_keeps_what_is_finished(tmp_path, told):
     """It says how much, and nothing is torn."""
     process = run(tmp_path)
-    wait_for(tmp_path / "cases.jsonl", 20, process)
+    wait_for(tmp_path / "cases.sqlite", 20, process)
     process.send_signal(signal.SIGINT)
     process.wait(timeout=20)
     words = process.stderr.read()
     process.stderr.close()
-    with Store(tmp_path / "cases.jsonl") as store:
+    with Store(tmp_path / "cases.sqlite") as store:
         assert f"stopped: {len(store)} cases are in" in words
         assert "Traceback" not in words
 
@@ -377,7 +454,7 @@ def test_interrupted_is_a_keyboard_interrupt():
 @pytest.fixture(scope="module")
 def real(tmp_path_factory):
     """A small part of fig3a, by this process."""
-    return scanned(small(), tmp_path_factory.mktemp("real") / "c.jsonl", Here(), solve_case)
+    return scanned(small(), tmp_path_factory.mktemp("real") / "c.sqlite", Here(), solve_case)
 
 
 def test_real_scan_sees_the_three_modes(real):
@@ -393,7 +470,7 @@ def test_real_scan_sees_the_three_modes(real):
 def test_rows_do_not_depend_on_the_number_of_workers(tmp_path, real):
     """To the last bit, but for the time taken."""
     with workers(2) as crew:
-        two = scanned(small(), tmp_path / "cases.jsonl", crew, solve_case)
+        two = scanned(small(), tmp_path / "cases.sqlite", crew, solve_case)
     assert timeless(two.sorted_rows) == timeless(real.sorted_rows)
 
 
@@ -408,7 +485,7 @@ def test_dask_workers_do_the_same_and_may_be_killed(tmp_path, undisturbed, told)
     ):
         assert isinstance(crew, Cluster)
         assert crew.width == 2
-        found = scanned(TOY, tmp_path / "cases.jsonl", crew, toy_that_dies_once)
+        found = scanned(TOY, tmp_path / "cases.sqlite", crew, toy_that_dies_once)
     assert told.exists()
     assert timeless(found.sorted_rows) == timeless(undisturbed.sorted_rows)
 

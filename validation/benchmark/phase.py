@@ -109,7 +109,7 @@ def _dask(repeats: int) -> Iterator[Row]:
 
 def _wall(cases: Sequence[Case], crew: Workers, solve: Solve) -> tuple[float, float]:
     """Wall time of cases and the sum of what they say that they took [s]."""
-    with tempfile.TemporaryDirectory() as folder, Store(File(folder) / "cases.jsonl") as store:
+    with tempfile.TemporaryDirectory() as folder, Store(File(folder) / "cases.sqlite") as store:
         started = time.perf_counter()
         solve_all(cases, store, crew, solve=solve)
         wall = time.perf_counter() - started

@@ -49,7 +49,7 @@ class Killed:
     cases : different ones that were begun
     begun : how often one was begun
     in_flight : begun by the run that was killed and not yet in the store, at each kill
-    stored : lines of the store
+    stored : cases in the store
     same : which tables are the same as those of the run that was not killed, by name
     """
 
@@ -79,7 +79,7 @@ class Killed:
         return (
             f"{self.kills} kills; in flight at one: {flight}, {sum(self.in_flight)} in all\n"
             f"{self.cases} cases, of which {self.again} were begun more than once; "
-            f"{self.stored} lines in the store\n{same}"
+            f"{self.stored} cases in the store\n{same}"
             f"{'as if there had been no kill' if self.ok else 'NOT as it should be'}"
         )
 
@@ -243,7 +243,7 @@ def killed(wanted: Wanted, folder: File, *, times: int, seed: int) -> Killed:
         len(begun),
         begun.total(),
         flight,
-        (apart / STORE).read_bytes().count(b"\n"),
+        _stored(apart / STORE),
         {name: _same(undisturbed / name, apart / name) for name in TABLES},
     )
 
@@ -258,6 +258,11 @@ def _time_to_start(wanted: Wanted, folder: File) -> float:
     ready = time.monotonic() - began
     kill(process)
     return ready
+
+
+def _stored(file: File) -> int:
+    with Store(file) as store:
+        return len(store)
 
 
 def _same(one: File, other: File) -> bool:
