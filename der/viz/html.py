@@ -11,6 +11,7 @@ import html
 import importlib.util
 import json
 import math
+import re
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Any
@@ -117,15 +118,14 @@ def page(path: Path | Sequence[Path], *, frames: int = FRAMES) -> str:
     head, body = "ring-origami: " + " and ".join(names(paths)), files("der.viz") / "html_page.html"
     parts = {
         "TITLE": html.escape(head),
-        "DATA": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
+        # no "<" that could end the element or begin a comment; JSON's text is otherwise ASCII
+        "DATA": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
         "ABOUT": html.escape("\n\n".join(map(about, paths, motions))),
         "PLAYER": (files("der.viz") / "html_page.js").read_text(encoding="utf-8"),
         "PLOTLY": get_plotlyjs(),
     }
     text = body.read_text(encoding="utf-8")
-    for name, part in parts.items():  # plotly's code last: it may contain any text
-        text = text.replace(f"%{name}%", part)
-    return text
+    return re.sub(f"%({'|'.join(parts)})%", lambda place: parts[place[1]], text)  # in one pass
 
 
 def packed(values: ArrayLike, kind: str = "f4") -> str:
@@ -218,7 +218,8 @@ def _curve(path: Path, name: str, own: str | None, label: str) -> Iterator[dict[
     said: set[object] = set()
     for kind, points in stretches(path, heights):
         look = STRETCHES[kind]
-        text = f"{label}, {look.label}" if label else look.label
+        # plotly reads names as HTML
+        text = html.escape(f"{label}, {look.label}" if label else look.label, quote=False)
         yield {
             "type": "scatter",
             "mode": "lines",

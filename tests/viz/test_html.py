@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,6 +67,24 @@ def view_html_code():
     from plotly.offline import get_plotlyjs
 
     return get_plotlyjs()
+
+
+HOSTILE = "%DATA%%PLOTLY%%ABOUT%</script><script>alert(1)</script><!--<script><b>"
+
+
+def test_a_page_of_a_stranger_is_data(path, text):
+    """What looks like a place of the template stays as it is, and markup is escaped."""
+    evil = replace(path, ring={**path.ring, "shape": HOSTILE})
+    one = page(evil, frames=FRAMES)
+    both = page([evil, path], frames=FRAMES)
+    for made, usual in ((one, text), (both, page([path, path], frames=FRAMES))):
+        assert len(made) - len(usual) < 40 * len(HOSTILE)
+        for word in ("<script", "</script", "<!--"):
+            assert made.count(word) == usual.count(word)
+        assert data(made)["rings"][0]["name"].startswith(HOSTILE)
+    labels = [trace["name"] for trace in data(both)["figure"]["data"]]
+    assert any(html.escape(HOSTILE) in label for label in labels)
+    assert not any("<" in label for label in labels)
 
 
 def test_page_has_every_step_of_the_film(path, text):

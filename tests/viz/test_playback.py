@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from contextlib import closing
 
 import pytest
@@ -211,6 +212,13 @@ def free_port():
         return found.getsockname()[1]
 
 
+def reached_elsewhere(port):
+    """Whether a server answers at another address than the one it says, as one for all would."""
+    with socket.socket() as asking:
+        asking.settimeout(5.0)
+        return asking.connect_ex(("127.0.0.2", port)) == 0
+
+
 def test_live_serves_until_ctrl_c(tmp_path):
     """It tells the address, writes the recording, answers, and ends with code 0, at once."""
     port, file = free_port(), tmp_path / "p.rrd"
@@ -221,12 +229,31 @@ def test_live_serves_until_ctrl_c(tmp_path):
             assert f"rerun rerun+http://127.0.0.1:{port}/proxy" in lines[0]
             assert lines[1] == "der: the recording can be watched until Ctrl-C\n"
             socket.create_connection(("127.0.0.1", port), timeout=5).close()
+            assert not reached_elsewhere(port)
             live.send_signal(signal.SIGINT)
             assert live.wait(timeout=20) == 0
             assert live.stderr.read() == ""
         finally:
             live.kill()
     assert file.exists()
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", port), timeout=5)
+
+
+def test_server_ends_with_a_run_that_is_killed(tmp_path):
+    """A server left behind would keep the port, and the ring."""
+    port = free_port()
+    command = [sys.executable, "-m", "der", *SMALL, "--live", "--port", str(port)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as live:
+        live.stderr.readline()
+        live.kill()
+    for _ in range(100):
+        try:
+            socket.create_connection(("127.0.0.1", port), timeout=5).close()
+        except ConnectionRefusedError:
+            return
+        time.sleep(0.05)
+    pytest.fail("the server still listens")
 
 
 def test_live_names_a_port_in_use(capsys):

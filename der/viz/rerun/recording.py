@@ -8,7 +8,6 @@ atomically. The main timeline is `step`, the steps of the motion. The second one
 from __future__ import annotations
 
 import hashlib
-import socket
 from collections.abc import Callable, Sequence
 from typing import Self
 
@@ -37,6 +36,7 @@ from der.viz.rerun.blueprint import (
 from der.viz.rerun.curves import send_curve, send_events, send_key, send_series
 from der.viz.rerun.entities import PAIR, VERMILION, Entities, closed, send_ring
 from der.viz.rerun.landscape import send_landscape, send_surface
+from der.viz.rerun.server import serving
 from der.viz.resampling import in_step, one_or_two
 from der.viz.titles import names
 
@@ -107,7 +107,7 @@ def recording_bytes(path: Path | Sequence[Path], *, rest: Array | None = None) -
 
 
 class Live:
-    """A recording that is served while the path is solved; a context.
+    """A recording that is served on this computer while the path is solved; a context.
 
     `show` adds the states one by one, on their own timeline; `finish` adds the complete path.
 
@@ -118,11 +118,12 @@ class Live:
     """
 
     def __init__(self, port: int) -> None:
-        _check_free(port)
+        self._server = serving(port)
+        self.address = self._server.__enter__()
         self._shown = 0
         self._stream = rr.RecordingStream(APPLICATION, send_properties=False)
         self._stream.set_log_time_enabled(False)
-        self.address: str = self._stream.serve_grpc(grpc_port=port)
+        self._stream.connect_grpc(self.address)
         self._stream.send_blueprint(while_solving())
 
     def show(self, x: Array) -> None:
@@ -146,18 +147,7 @@ class Live:
     def __exit__(self, *_: object) -> None:
         self._stream.flush()  # else the server reports data that it could not send
         self._stream.disconnect()
-
-
-def _check_free(port: int) -> None:
-    """Refuse a port that cannot be listened on: rerun's server would only log that it failed."""
-    if not 0 < port < 65536:
-        raise ValueError(f"port must be from 1 to 65535, got {port}")
-    with socket.socket() as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as the server does
-        try:
-            trial.bind(("", port))
-        except OSError as problem:
-            raise ValueError(f"port must be free, got {port}: {problem.strerror}") from problem
+        self._server.__exit__(None, None, None)
 
 
 def _recorded(
