@@ -42,9 +42,13 @@ def circle(natural_curvature: float = 1.0) -> Ring:
     Raises
     ------
     ValueError
-        If `natural_curvature` is not a finite number.
+        If `natural_curvature` is not a number from -1e6 to 1e6.
     """
-    natural_curvature = checked_number("natural_curvature", natural_curvature)
+    largest = 1.0 / SMALLEST
+    allowed = f"a finite number from {-largest:g} to {largest:g}"
+    natural_curvature = checked_number(
+        "natural_curvature", natural_curvature, allowed, lambda k: abs(k) <= largest
+    )
     parameters = {"natural_curvature": natural_curvature}
     outline = closed_curve(arc(1.0, np.pi))
     return Ring("circle", parameters, "x", "D2", outline, natural_curvature)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from der.records.record import Record, SolveTime
-from der.records.values import Column, Count, Json, Text, gaps, mapping
+from der.records.values import Column, Count, NumericsEntry, RingEntry, Text, gaps, mapping
 from der.utils.checks import Array
 
 _ALONG = gaps("h_over_t")
@@ -17,8 +17,8 @@ _ALONG = gaps("h_over_t")
 class BarrierCurves(Record, name="barriers over h/t", kind="barriers", plot="barriers"):
     """Barriers over the section's h/t; NaN where there is none, or none is known."""
 
-    ring: Json
-    numerics: Json
+    ring: RingEntry
+    numerics: NumericsEntry
     h_over_t: Column  # (n,)
     fold: Annotated[Array, _ALONG]  # (n,) from flat, with clamped grips that turn freely
     open: Annotated[Array, _ALONG]  # (n,) from folded

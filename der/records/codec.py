@@ -11,16 +11,22 @@ from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
 from inspect import isclass
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from der.records.entries import Checked, entry_of, written
-from der.utils.checks import shown
+from der.utils import checks
+from der.utils.checks import short, shown
 
 Kind = TypeVar("Kind", bound=Checked)
+LONGEST = 400  # characters of a sentence about what is wrong
 
 
 class _Misplaced(ValueError):
     """A value of the wrong kind; its message follows the name of its place."""
+
+
+class _InList(ValueError):
+    """What is wrong with the entry of a list at the place that is its message."""
 
 
 def record_of(kind: type[Kind], values: Any) -> Kind:
@@ -37,21 +43,30 @@ def record_of(kind: type[Kind], values: Any) -> Kind:
     try:
         found: Kind = _converter().structure(values, kind)
     except (BaseValidationError, ValueError) as problem:
-        raise ValueError(_fault(problem)) from None
+        raise ValueError(short(_fault(problem), LONGEST)) from None
+    except RecursionError:
+        raise ValueError("an entry is nested too deep") from None
     return found
 
 
 @cache
 def _converter() -> Any:
     """The converter, with hooks for entries, tuples and objects."""
-    from cattrs import Converter
+    from cattrs import BaseValidationError, Converter
     from cattrs.gen import make_dict_structure_fn, override
 
     converter = Converter(detailed_validation=True)
 
     def of_tuple(hint: Any) -> Callable[[Any, Any], Any]:
-        many: Any = list.__class_getitem__(get_args(hint)[0])
-        return lambda value, _: tuple(converter.structure(_a(list, value), many))
+        kind = get_args(hint)[0]
+
+        def one(place: int, value: Any) -> Any:
+            try:
+                return converter.structure(value, kind)
+            except (BaseValidationError, ValueError) as problem:  # the first ends the list
+                raise _InList(f"[{place}]") from problem
+
+        return lambda value, _: tuple(one(*pair) for pair in enumerate(_a(list, value)))
 
     def of_object(kind: Any) -> Callable[[Any, Any], Any]:
         hints = get_type_hints(kind, include_extras=True)
@@ -89,27 +104,29 @@ def _is_tuple(hint: Any) -> bool:
 def _a(kind: type, value: Any) -> Any:
     """The value, if it is a list or an object."""
     if isinstance(value, kind):
-        return value
+        return checks.keyed("an object", value) if kind is dict else value
     raise _Misplaced(f"must be {'a list' if kind is list else 'an object'}, got {shown(value)}")
 
 
 def _fault(problem: BaseException) -> str:
     """The first thing that is wrong, after its place."""
     from cattrs import BaseValidationError, ForbiddenExtraKeysError
-    from cattrs.errors import AttributeValidationNote, IterableValidationNote
+    from cattrs.errors import AttributeValidationNote
 
     place = ""
-    while isinstance(problem, BaseValidationError):
+    while isinstance(problem, BaseValidationError | _InList):
+        if isinstance(problem, _InList):
+            place += str(problem)
+            problem = cast(BaseException, problem.__cause__)
+            continue
         noted, others = problem.group_exceptions()  # type: ignore[attr-defined]
         kind: Any = problem.cl
         problem, note = noted[0] if noted else (others[0], None)
-        if isinstance(note, IterableValidationNote):
-            place += f"[{note.index}]"
-        elif isinstance(note, AttributeValidationNote) and note.name != kind.JOINED:
+        if isinstance(note, AttributeValidationNote) and note.name != kind.JOINED:
             place += f".{note.name}" if place else note.name
     if isinstance(problem, _Misplaced):
         return f"{place} {problem}"
     before = f"{place}." if place else ""
     if isinstance(problem, ForbiddenExtraKeysError):
         return f"{before}{min(problem.extra_fields)} is no entry of such a record"
-    return before + " ".join(str(problem).split())
+    return before + str(problem)

@@ -5,19 +5,22 @@ Free of kernels, like the record of the path. They are saved in a file of their 
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import BinaryIO
 
 import numpy as np
+from numpy.lib import format as npy
 
 from der.utils import checks
 from der.utils.checks import Array
 from der.utils.files import FilePath, write_whole
 
-LARGEST = 2**33  # bytes of arrays that are read
+LARGEST = 2**28  # bytes of arrays that are read from a smaller file
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,13 +177,11 @@ class Shapes:
         """
         with open(path, "rb") as file:
             try:
-                _check_size(file)
-                with np.load(file, allow_pickle=False) as npz:
-                    arrays = {name: npz[name] for name in npz.files}
+                arrays = _arrays(file)
                 x, frames, places = arrays["x"], arrays["frames"], arrays.get("arc_length")
                 falls, modes, inside = _falls(arrays), _softest(arrays), _internal(arrays)
             except Exception as problem:  # zipfile and numpy raise some ten classes on broken files
-                why = " ".join(str(problem).split())
+                why = checks.short(str(problem))
                 raise ValueError(
                     f"{os.fspath(path)}: no shapes.npz as --out writes ({why})"
                 ) from problem
@@ -198,17 +199,42 @@ def _keep(record: object, called: str, name: str, shape: tuple[int | str, ...]) 
     return array
 
 
-def _check_size(file: BinaryIO) -> None:
-    """Refuse what would not fit the memory, before it is unpacked."""
-    size = sum(part.file_size for part in zipfile.ZipFile(file).infolist())
-    if size > LARGEST:
-        raise ValueError(f"arrays of {size} bytes, and {LARGEST} are allowed")
-    file.seek(0)
+def _arrays(file: BinaryIO) -> dict[str, Array]:
+    """The arrays of an npz file that shapes have, by name; others are not read.
+
+    `Shapes.save` does not compress: what unpacks to more than its file, and is large, is refused.
+    """
+    allowed = max(LARGEST, file.seek(0, os.SEEK_END))
+    with zipfile.ZipFile(file) as archive:
+        parts = {part.filename.removesuffix(".npy"): part for part in archive.infolist()}
+        parts = {name: part for name, part in parts.items() if _NAMES.fullmatch(name)}
+        size = sum(part.file_size for part in parts.values())
+        if size > allowed:
+            raise ValueError(f"arrays of {size} bytes, and {allowed} are allowed")
+        return {name: _array(archive, part) for name, part in parts.items()}
+
+
+def _array(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> Array:
+    """One array, whose header must say its size: numpy makes room for it before it reads."""
+    with archive.open(part) as content:
+        version = npy.read_magic(content)
+        headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+        shape, _, kind = headers[version](content)
+        size = content.tell() + math.prod(shape) * kind.itemsize
+        if kind.hasobject or size != part.file_size:
+            raise ValueError(f"{part.filename} is no array of {part.file_size} bytes")
+        content.seek(0)
+        found: Array = npy.read_array(content, allow_pickle=False)
+        return found
 
 
 def _named(prefix: str, record: Fall | Softest | Internal) -> dict[str, Array]:
     """The entries of a record as arrays of the file."""
     return {f"{prefix}/{name}": np.asarray(value) for name, value in vars(record).items()}
+
+
+_SNAP, _MODES = ("|".join(entry.name for entry in fields(kind)) for kind in (Fall, Softest))
+_NAMES = re.compile(rf"x|frames|arc_length|falls/\d{{1,6}}/({_SNAP})|softest/({_MODES})")
 
 
 def _falls(arrays: Mapping[str, Array]) -> tuple[Fall, ...]:

@@ -30,7 +30,7 @@ def _indices(name: str, given: Any) -> Counts:
 
 _GRID = ("gamma", "distance")
 _MAP = gaps(*_GRID)
-_MINIMA = Entry(nested(checks.checked_number, 3), dims=_GRID)
+_MINIMA = Entry(nested(checks.number, 3), dims=_GRID)
 _INDEX = Entry(
     _indices, lambda index: [[None if i < 0 else i for i in row] for row in index.tolist()], _GRID
 )

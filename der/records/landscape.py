@@ -21,9 +21,11 @@ from der.records.units import unit
 from der.records.values import (
     Count,
     Estimates,
-    Json,
     Number,
+    NumericsEntry,
+    RingEntry,
     ScaleEntry,
+    SectionEntry,
     Text,
     Texts,
     Truth,
@@ -195,9 +197,9 @@ class Heights(Checked):
 class Pass(Record, name="barrier of the free ring", kind="pass", plot="minimum_energy_path"):
     """The lowest saddle found between flat and folded of the free ring, and the path over it."""
 
-    ring: Json
-    section: Json
-    numerics: Json
+    ring: RingEntry
+    section: SectionEntry
+    numerics: NumericsEntry
     scale: ScaleEntry | None = None
     barriers: Heights
     twisting: Barriers  # the same in clamped grips that turn freely

@@ -14,15 +14,18 @@ from der.records.entries import Checked, Entry, in_memory
 from der.records.record import Record, SolveTime, Status
 from der.records.units import unit
 from der.records.values import (
+    NUMERICS,
     Count,
     Estimates,
-    Json,
     Number,
+    RingEntry,
     ScaleEntry,
+    SectionEntry,
     Text,
     Truth,
     numbers,
     one_of,
+    stated,
     table,
 )
 from der.utils import checks
@@ -95,9 +98,9 @@ class LeastPush(Record, name="least push", kind="push", plot="opening"):
 
     status: Status
     why: Text  # a sentence where there is none
-    ring: Json
-    section: Json
-    numerics: Json
+    ring: RingEntry
+    section: SectionEntry
+    numerics: Annotated[Mapping[str, object], stated("points", points=checks.count, **NUMERICS)]
     scale: ScaleEntry | None = None
     barrier: Number | None  # of the free ring, to open: no slow push takes less
     twisting: Number | None  # in clamped grips that turn freely

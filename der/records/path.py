@@ -25,7 +25,10 @@ from der.records.values import (
     Count,
     Json,
     Number,
+    NumericsEntry,
+    RingEntry,
     ScaleEntry,
+    SectionEntry,
     Text,
     Truth,
     along,
@@ -135,9 +138,9 @@ class Path(Record, name="path", plot="path"):
     status: Status = "done"  # the states of an incomplete path are good
     message: Text = ""  # a sentence about the status
     reason: Annotated[str, one_of(REASONS)] = ""  # why it ended: `word` of a der.errors.Reason
-    ring: Json  # the statement, as in its JSON form
-    section: Json
-    numerics: Json
+    ring: RingEntry  # the statement, as in its JSON form
+    section: SectionEntry
+    numerics: NumericsEntry
     scale: ScaleEntry | None = None  # None: not dimensional
     gamma: Column  # (n,) rad, in path order; with error bars the extrapolated values
     moment: Annotated[Array, along("gamma")]  # GJ/a, of one arm

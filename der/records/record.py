@@ -20,7 +20,15 @@ from der.geometry.scale import Scale
 from der.records.codec import record_of
 from der.records.entries import Checked, plain
 from der.records.units import in_units
-from der.records.values import Json, Number, ScaleEntry, Text, one_of
+from der.records.values import (
+    Number,
+    NumericsEntry,
+    RingEntry,
+    ScaleEntry,
+    SectionEntry,
+    Text,
+    one_of,
+)
 from der.utils.checks import shown
 from der.utils.files import FilePath, Saved, json_entries, json_lines
 
@@ -199,9 +207,9 @@ class RingRecord(Record):
 
     status: Status = "done"
     message: Text = ""  # a sentence about the status
-    ring: Json
-    section: Json
-    numerics: Json
+    ring: RingEntry
+    section: SectionEntry
+    numerics: NumericsEntry
     scale: ScaleEntry | None = None
 
 

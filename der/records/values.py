@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from der.geometry.scale import Scale
+from der.geometry.section import SPREAD
 from der.records.entries import Check, Entry
 from der.utils import checks
 from der.utils.checks import Array
@@ -18,7 +19,9 @@ from der.utils.checks import Array
 
 def integer(name: str, value: object) -> int:
     """Return an integer of either sign."""
-    return int(checks.checked_number(name, value, "an integer", float.is_integer))
+    return int(
+        checks.checked_number(name, checks.number(name, value), "an integer", float.is_integer)
+    )
 
 
 def one_of(allowed: Sequence[str]) -> Entry:
@@ -26,7 +29,7 @@ def one_of(allowed: Sequence[str]) -> Entry:
     return Entry(lambda name, value: checks.one_of(name, value, allowed))
 
 
-Number = Annotated[float, Entry(checks.checked_number)]
+Number = Annotated[float, Entry(checks.number)]
 Count = Annotated[int, Entry(checks.count)]
 Integer = Annotated[int, Entry(integer)]
 Text = Annotated[str, Entry(checks.text)]
@@ -48,6 +51,48 @@ def _scale(name: str, value: object) -> Scale:
 
 
 ScaleEntry = Annotated[Scale, Entry(_scale, asdict)]
+
+
+def stated(*needed: str, **known: Check) -> Entry:
+    """An object of JSON values, of which some have a check of their own, and some must be there."""
+
+    def check(name: str, value: object) -> dict[str, Any]:
+        found = checks.json_object(name, value)
+        if missing := [key for key in needed if key not in found]:
+            raise ValueError(f"{name}.{missing[0]} is missing")
+        return found | {
+            key: own(f"{name}.{key}", found[key]) for key, own in known.items() if key in found
+        }
+
+    return Entry(check)
+
+
+def _ratio(name: str, value: object) -> float:
+    allowed = f"a number from {1.0 / SPREAD:g} to {SPREAD:g}"
+    return checks.checked_number(name, value, allowed, lambda r: 1.0 / SPREAD <= r <= SPREAD)
+
+
+def _gammas(name: str, value: object) -> list[float]:
+    return checks.each(name, value, checks.number)
+
+
+_maybe_ratio, _maybe_number = checks.optional(_ratio), checks.optional(checks.number)
+RingEntry = Annotated[Mapping[str, object], stated("shape", shape=checks.text)]
+SectionEntry = Annotated[
+    Mapping[str, object],
+    stated(
+        *("alpha", "beta"),
+        **dict.fromkeys(("alpha", "beta"), _ratio),
+        **dict.fromkeys(("h_over_t", "GJ"), _maybe_ratio),
+        nu=_maybe_number,
+    ),
+]
+NUMERICS: dict[str, Check] = {
+    "tolerance": checks.positive,
+    "a_over_t": _maybe_ratio,
+    "save_at": checks.optional(_gammas),
+}
+NumericsEntry = Annotated[Mapping[str, object], stated(**NUMERICS)]
 
 
 def nested(check: Check, depth: int) -> Check:
@@ -112,7 +157,7 @@ def _with_nan(name: str, values: Any, ndim: int) -> Array:
     """Nested lists of numbers and None, or an array, as an array with NaN."""
     plain_array = isinstance(values, np.ndarray) and values.dtype == np.float64
     if plain_array and values.ndim == ndim and not np.isinf(values).any():
-        return values.copy()
+        return checks.bounded(name, values.copy())
     if ndim > 1:
         rows = checks.each(name, values, lambda at, row: _with_nan(at, row, ndim - 1))
         return np.array(rows, dtype=float)
@@ -122,7 +167,7 @@ def _with_nan(name: str, values: Any, ndim: int) -> Array:
 
 def _number_or_nan(name: str, value: Any) -> float:
     gap = value is None or (isinstance(value, float) and np.isnan(value))
-    return np.nan if gap else checks.checked_number(name, value)
+    return np.nan if gap else checks.number(name, value)
 
 
 def _with_null(values: Array) -> Any:
@@ -134,16 +179,10 @@ def _with_null(values: Array) -> Any:
 # --- Mappings --------------------------------------------------------------------------------
 
 
-def _object(name: str, value: Any) -> Mapping[Any, Any]:
-    if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be an object, got {checks.shown(value)}")
-    return value
-
-
 def _estimates(name: str, given: Any) -> dict[str, tuple[float, float]]:
     """Values with their errors; null in the file where there are none."""
     found = {}
-    for key, pair in ({} if given is None else _object(name, given)).items():
+    for key, pair in ({} if given is None else checks.keyed(name, given)).items():
         place = f"{name}.{key}"
         if isinstance(pair, Mapping):
             if set(pair) != {"value", "error"}:
@@ -167,14 +206,14 @@ def mapping(entry: Entry) -> Entry:
     """An object whose values are all of one type; null in the file where it is empty."""
 
     def check(name: str, given: Any) -> dict[str, Any]:
-        known = {} if given is None else _object(name, given)
+        known = {} if given is None else checks.keyed(name, given)
         return {key: entry.check(f"{name}.{key}", value) for key, value in known.items()}
 
     return Entry(check, lambda found: {key: entry.write(v) for key, v in found.items()} or None)
 
 
-def _text_object(name: str, given: Any) -> dict[str, str]:
-    return {key: checks.text(f"{name}.{key}", v) for key, v in _object(name, given).items()}
+def _texts(name: str, given: Any) -> dict[str, str]:
+    return {key: checks.text(f"{name}.{key}", v) for key, v in checks.keyed(name, given).items()}
 
 
-Texts = Annotated[Mapping[str, str], Entry(_text_object, dict)]
+Texts = Annotated[Mapping[str, str], Entry(_texts, dict)]

@@ -5,6 +5,7 @@ got -1". A bool is no number; scalars of numpy are numbers.
 """
 
 import math
+import reprlib
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from numbers import Real
@@ -17,6 +18,9 @@ Array: TypeAlias = NDArray[np.float64]
 Counts: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.int64]]"
 T = TypeVar("T")
 
+LARGEST = 1e30  # number of a record or array: its square, and its single precision, are finite
+LONGEST = 2000  # characters of a text in a record
+LEVELS = 20  # of objects and lists in each other
 
 # --- Arguments -------------------------------------------------------------------------------
 
@@ -63,14 +67,25 @@ def checked_number(
     raise ValueError(f"{name} must be {allowed}, got {shown(value)}")
 
 
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel = 5
+_SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = _SHORT.maxset = _SHORT.maxfrozenset = 50
+_SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 400
+
+
 def shown(value: object) -> str:
     """Return any value as text for a sentence: one line of limited length."""
     try:
-        text = str(value) if isinstance(value, Real) else repr(value)
+        text = str(value) if isinstance(value, Real) else _SHORT.repr(value)
     except ValueError:  # integers of more than 4300 digits cannot be printed
         text = f"a {type(value).__name__} of too many digits"
+    return short(text)
+
+
+def short(text: str, most: int = 200) -> str:
+    """Return a text as one line of limited length."""
     text = " ".join(text.split())
-    return text if len(text) <= 200 else f"{text[:190]} ..."
+    return text if len(text) <= most else f"{text[: most - 10]} ..."
 
 
 def positive(name: str, value: object) -> float:
@@ -118,17 +133,37 @@ def checked_array(name: str, values: ArrayLike | None, shape: tuple[int | str, .
         raise ValueError(f"{name} must have shape {wanted}, got {given.shape}")
     for place in np.argwhere(~np.isfinite(given))[:1].tolist():
         raise ValueError(f"{name} must be finite numbers, got {name}{place} = {given[*place]}")
-    return given.astype(np.float64)
+    return bounded(name, given.astype(np.float64))
+
+
+def bounded(name: str, values: Array) -> Array:
+    """Return an array if none of its numbers is larger than `LARGEST`."""
+    for place in np.argwhere(np.abs(values) > LARGEST)[:1].tolist():
+        where = f"{name}{place}" if place else name
+        raise ValueError(f"{where} must be at most {LARGEST:g} in size, got {values[*place]}")
+    return values
 
 
 # --- Entries of a record ---------------------------------------------------------------------
 
 
+def number(name: str, value: object) -> float:
+    """Return a finite number that is not larger than `LARGEST`."""
+    found = checked_number(name, value)
+    if abs(found) > LARGEST:
+        raise ValueError(f"{name} must be at most {LARGEST:g} in size, got {shown(value)}")
+    return found
+
+
 def text(name: str, value: object) -> str:
-    """Return a string."""
-    if isinstance(value, str):
-        return value
-    raise ValueError(f"{name} must be a text, got {shown(value)}")
+    """Return a string that can be printed: one line of limited length."""
+    if not isinstance(value, str):
+        raise ValueError(f"{name} must be a text, got {shown(value)}")
+    if len(value) > LONGEST:
+        raise ValueError(f"{name} must have at most {LONGEST} characters, got {len(value)}")
+    if not value.isprintable():  # half a character, or what a terminal takes for a command
+        raise ValueError(f"{name} must be one line of printable characters, got {shown(value)}")
+    return value
 
 
 def truth(name: str, value: object) -> bool:
@@ -156,6 +191,7 @@ def numbers(name: str, values: object) -> Array:
         array = np.array(values)
     else:
         array = np.array(each(name, values, checked_number), dtype=np.float64)
+    bounded(name, array)
     array.setflags(write=False)
     return array
 
@@ -185,27 +221,46 @@ def each(name: str, values: object, check: Callable[[str, Any], T]) -> list[T]:
     return [check(f"{name}[{i}]", value) for i, value in enumerate(values)]
 
 
-def json_object(name: str, value: object) -> dict[str, Any]:
-    """Return a copy of a mapping in the types of JSON, which a file keeps."""
+def keyed(name: str, value: object) -> Mapping[str, Any]:
+    """Return a mapping whose keys are texts."""
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a mapping, got {shown(value)}")
+        raise ValueError(f"{name} must be an object, got {shown(value)}")
+    for key in value:
+        text(f"a key of {name}", key)
+    return value
+
+
+def json_object(name: str, value: object, levels: int = LEVELS) -> dict[str, Any]:
+    """Return a copy of a mapping in the types of JSON, which a file keeps.
+
+    Parameters
+    ----------
+    levels : of mappings and lists in each other, at most.
+    """
     return {
-        text(f"a key of {name}", key): _json_value(f"{name}.{key}", entry)
-        for key, entry in value.items()
+        key: _json_value(f"{name}.{key}", entry, levels - 1)
+        for key, entry in keyed(name, value).items()
     }
 
 
-def _json_value(name: str, value: object) -> object:
+def _json_value(name: str, value: object, levels: int) -> object:
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    if value is None or isinstance(value, str | bool | int):
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str):
+        return text(name, value)
+    if isinstance(value, int):
+        number(name, value)
         return value
     if isinstance(value, float):
-        return checked_number(name, value)
+        return number(name, value)
+    if isinstance(value, Mapping | list | tuple) and not levels:
+        raise ValueError(f"{short(name)} must have at most {LEVELS} levels")
     if isinstance(value, Mapping):
-        return json_object(name, value)
+        return json_object(name, value, levels)
     if isinstance(value, list | tuple):
-        if all(type(entry) is float and math.isfinite(entry) for entry in value):
+        if all(type(entry) is float and abs(entry) <= LARGEST for entry in value):
             return list(value)  # long lists are of this kind
-        return each(name, value, _json_value)
+        return each(name, value, lambda at, entry: _json_value(at, entry, levels - 1))
     raise ValueError(f"{name} must be something JSON can hold, got a {type(value).__name__}")

@@ -1,6 +1,9 @@
 """Shapes, falls and softest modes come back from disk bit for bit, and refuse what is none."""
 
+import io
 import os
+import tracemalloc
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -81,12 +84,90 @@ def test_falls_and_modes_come_back_bit_for_bit(tmp_path):
     assert_array_equal(after.softest.u, before.softest.u, strict=True)
 
 
-def test_shapes_that_are_too_large_are_not_unpacked(tmp_path, monkeypatch):
-    """A small file can unpack to more than the memory holds."""
+def rewritten(file, change, how=zipfile.ZIP_STORED):
+    """The file of shapes with its parts changed: a dict of bytes by name."""
+    shapes().save(file)
+    with zipfile.ZipFile(file) as old:
+        parts = {name: old.read(name) for name in old.namelist()}
+    change(parts)
+    with zipfile.ZipFile(file, "w", how) as new:
+        for name, content in parts.items():
+            new.writestr(name, content)
+
+
+def npy(values):
+    """An array as a part of an npz file."""
+    content = io.BytesIO()
+    np.save(content, values)
+    return content.getvalue()
+
+
+@pytest.fixture
+def small_memory():
+    """At most 64 MB more than before can be had at a time while a file is read."""
+    tracemalloc.start()
+    yield
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2**26
+
+
+def test_shapes_that_unpack_to_much_more_are_not_unpacked(tmp_path, small_memory):
+    """3.2 MB became 3.1 GB."""
+    bomb = npy(np.zeros((1, 5, 3))).replace(b"(1, 5, 3)", b"(2400000,5,3)")[:128]
+    file = tmp_path / "bomb.npz"
+    shapes().save(file)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as new, new.open("x.npy", "w") as part:
+        part.write(bomb)
+        for _ in range(36):
+            part.write(bytes(8_000_000))
+    assert file.stat().st_size < 1e6
+    with pytest.raises(
+        ValueError, match=r"bomb\.npz: .*288000128 bytes, and 268435456 are allowed"
+    ):
+        Shapes.load(file)
+
+
+def test_compressed_shapes_come_back(tmp_path):
+    """Of a usual size; and from a file of more than is read of a small one."""
+    rewritten(tmp_path / "shapes.npz", lambda parts: None, zipfile.ZIP_DEFLATED)
+    assert_array_equal(Shapes.load(tmp_path / "shapes.npz").x, shapes().x, strict=True)
+
+
+def test_large_shapes_come_back(tmp_path, monkeypatch):
+    """As they are saved, without compression, no size is too large."""
     monkeypatch.setattr("der.records.configurations.LARGEST", 1000)
     shapes().save(tmp_path / "shapes.npz")
-    with pytest.raises(ValueError, match=r"shapes\.npz: .*1000 are allowed"):
-        Shapes.load(tmp_path / "shapes.npz")
+    assert_array_equal(Shapes.load(tmp_path / "shapes.npz").x, shapes().x, strict=True)
+
+
+def test_arrays_of_other_names_are_not_read(tmp_path):
+    """Neither one that numpy would not read, nor a pickle, nor one outside the folder."""
+    others = {"y.npy": b"?", "z.npy": b"cos\nsystem\n", "../x.npy": b"", "falls/x/x.npy": b""}
+    rewritten(tmp_path / "shapes.npz", lambda parts: parts.update(others))
+    assert_array_equal(Shapes.load(tmp_path / "shapes.npz").x, shapes().x, strict=True)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        npy(np.zeros((4, 5, 3))).replace(b"(4, 5, 3), }   ", b"(4, 5, 999999),}"),
+        npy(np.zeros((4, 5, 3))).replace(b"(4, 5, 3), }", b"(4, 5, -3),}"),
+        npy(np.zeros((4, 5, 3)))[:-8],
+        npy(np.zeros((4, 5, 3)) + 1e300),
+        npy(np.zeros((4, 5, 3)) * 1j),
+        npy(np.full((4, 5, 3), None, dtype=object)),
+        b"\x93NUMPY\x09\x00",
+        b"",
+    ],
+)
+def test_array_that_is_not_what_its_header_says_is_refused(tmp_path, content, small_memory):
+    """In one line, and before room is made for it."""
+    rewritten(tmp_path / "wrong.npz", lambda parts: parts.update({"x.npy": content}))
+    with pytest.raises(ValueError, match=r"wrong\.npz") as refused:
+        Shapes.load(tmp_path / "wrong.npz")
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 600
 
 
 def test_shapes_are_short_in_print():
