@@ -28,6 +28,10 @@ class Reason(Enum):
     TURNED_BACK = (
         "gamma turns back before gamma_max, and the path runs to -gamma_max without arriving"
     )
+    UNFOLDED = (
+        "gamma has left -4 pi to 4 pi, and the ring has not folded at pi; "
+        "a larger gamma_max goes on"
+    )
     INTERRUPTED = "stopped by the user"
 
     @property

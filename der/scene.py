@@ -22,6 +22,8 @@ COPIES = {"full": 1, "half": 2, "quarter": 4}  # how many of a sector make the r
 
 _STATED = (("ring", Ring, "circle()"), ("section", Section, "rectangular_section(4.0)"))
 
+FARTHEST = 10.0 * math.pi  # rad: gamma_max of more is taken for degrees
+UNFOLDED = 4.0 * math.pi  # rad: a path that is followed until it folds, at pi, ends there
 FEWEST_EDGES = 8
 MOST_EDGES = 65_536
 CROSSINGS_UP_TO = 1024  # edges; the writhe that finds self-crossings costs O(N^2)
@@ -56,9 +58,10 @@ class Scene:
         lowered from that of the ring at ``gamma_max``, through 0 where the folded ring is stable,
         and the ring ends where gamma stops at 0.
     solver : "newton", or "relaxation": the march of the angle by dynamic relaxation alone.
-    gamma_max : the path ends at its first arrival there [rad].
+    gamma_max : the path ends at its first arrival there [rad], at most 10 pi.
     until : "folded": the path ends at the three-covered state at pi, even if it first passes pi
-        and turns back; ``gamma_max`` then ends it only where it is above pi.
+        and turns back; ``gamma_max`` then ends it only where it is above pi. Without it, the path
+        is given up, as not converged, where gamma leaves -4 pi to 4 pi.
     save_at : values of gamma at which states are solved for [rad]; None: multiples of pi/8.
     curvature : measure of curvature, one of `MEASURES`.
     stretch : "inextensible", or "finite": EA = 12 EI1 (a_over_t / a)^2, a rectangular section's.
@@ -121,6 +124,11 @@ class Scene:
             one_of("until", self.until, ("folded",))
         for name in ("gamma_max", "a_over_t", "tolerance"):
             self._replace(name, positive)
+        if self.gamma_max > FARTHEST:
+            radians = f"{self.gamma_max:g} degrees are {math.radians(self.gamma_max):.10g}"
+            raise ValueError(
+                f"gamma_max must be at most 10 pi, in radians ({radians}), got {self.gamma_max!r}"
+            )
         if not 1.0 <= self.a_over_t <= THINNEST:
             raise ValueError(f"a_over_t must be from 1 to {THINNEST:g}, got {self.a_over_t!r}")
         if self.tolerance > 1e-4:
@@ -168,6 +176,19 @@ class Scene:
     def stretching(self) -> float:
         """EA in GJ/a^2; 0 for an inextensible ring."""
         return 12.0 * self.section.alpha * self.a_over_t**2 if self.stretch == "finite" else 0.0
+
+    @property
+    def last_gamma(self) -> float:
+        """The path ends at this gamma, or at its negative, at the latest [rad]."""
+        return UNFOLDED if self._without_end else self.gamma_max
+
+    @property
+    def _without_end(self) -> bool:
+        return self.until == "folded" and self.gamma_max <= math.pi
+
+    def unfolded(self, gamma: float) -> bool:
+        """Whether a path that should have ended folded is given up at this gamma."""
+        return self._without_end and abs(gamma) == UNFOLDED
 
     @property
     def looks_for_self_crossings(self) -> bool:

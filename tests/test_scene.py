@@ -297,3 +297,14 @@ def test_the_old_name_of_self_crossings_is_accepted_with_a_warning():
         assert dataclasses.replace(scene(), contacts=True).self_crossings is True
     with pytest.warns(DeprecationWarning, match="self_crossings"):
         assert old.contacts is False
+
+
+@pytest.mark.parametrize(("degrees", "radians"), [(180, "3.141592654"), (720.0, "12.56637061")])
+def test_gamma_max_in_degrees_is_refused_with_a_hint(degrees, radians):
+    """A slip that cost a path to -78 rad."""
+    hint = rf"degrees are {radians}\), got {degrees}"
+    words = rf"^gamma_max must be at most 10 pi, in radians .* {hint}"
+        rf"^gamma_max must be at most 10 pi, in radians .* degrees are {radians}\), got {degrees}"
+    )
+    with pytest.raises(ValueError, match=words):
+        scene(gamma_max=degrees)

@@ -82,6 +82,8 @@ def fold(
         points = run.collect(_points(scene, ring, request, statistics), tell)
         if run.done and points[-1].solution.parameter == -scene.gamma_max:
             run.note(Reason.TURNED_BACK)
+        if run.done and scene.unfolded(points[-1].solution.parameter):
+            run.stop(Reason.UNFOLDED)
         found = _Found(scene, ring, points)
         if run.done and scene.error_bars:
             found = run.attempt(partial(found.extrapolated, request)) or found
@@ -91,13 +93,12 @@ def fold(
 
 def _request(scene: Scene) -> Request:
     """The request of a scene."""
-    until_folded = scene.until == "folded"
     counting = scene.stability or scene.looks_for_self_crossings
     # if only listed states are wanted, steps may be longer
     turn = Options.aimed_turn if counting or scene.save_at is None else LOOSE_TURN
     return Request(
-        gamma_max=math.inf if until_folded and scene.gamma_max <= math.pi else scene.gamma_max,
-        until_folded=until_folded,
+        gamma_max=scene.last_gamma,
+        until_folded=scene.until == "folded",
         targets=None if scene.save_at is None else tuple(scene.save_at),
         stability=scene.stability,
         self_crossings=scene.looks_for_self_crossings,

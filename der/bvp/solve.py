@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cache
 
@@ -75,6 +74,8 @@ def solve_with_points(
         points += run.collect(follow(followed.system, wanted, followed.statistics), tell)
         if run.done and followed.turned_back:
             run.note(Reason.TURNED_BACK)
+        if run.done and scene.unfolded(points[-1].solution.gamma):
+            run.stop(Reason.UNFOLDED)
         path = followed.record(run)
     return run.answer(path), points
 
@@ -82,10 +83,9 @@ def solve_with_points(
 def _wanted(followed: Followed) -> Wanted:
     """What a scene asks for on its path."""
     scene = followed.scene
-    until_folded = scene.until == "folded"
     return Wanted(
-        gamma_max=math.inf if until_folded and scene.gamma_max <= math.pi else scene.gamma_max,
-        until=followed.three_covered if until_folded else None,
+        gamma_max=scene.last_gamma,
+        until=followed.three_covered if scene.until == "folded" else None,
         targets=None if scene.save_at is None else tuple(scene.save_at),
         tolerance=ACROSS * followed.tolerance,
     )

@@ -24,6 +24,10 @@ from der.utils.checks import checked_number, shown
 DATA = ("reference_length", "curvature_error", "resolution")  # of a profile: what it was made of
 SMALLEST = 1e-6  # semi-axis or fillet: rounding of s, 1e-16, times the curvature is lost in angles
 
+# fillet: s is rounded by 4e-16, angles by that over the radius, which must stay below 1e-10, the
+# tolerance of equilibria; paths of sharper ones end in noise
+SHARPEST = 1e-5
+
 
 def circle(natural_curvature: float = 1.0) -> Ring:
     """Return a circular ring of radius a.
@@ -60,7 +64,7 @@ def ellipse(b_over_a: float, twist_axis: str = "x") -> Ring:
     Parameters
     ----------
     b_over_a : float
-        Short semi-axis over the long one, in (0, 1], at least 1e-6; a is the long one, about
+        Short semi-axis over the long one, in (0, 1], at least 1e-5; a is the long one, about
         either axis.
     twist_axis : str
         "x": grips at the ends of the short semi-axis; "y": of the long one.
@@ -85,10 +89,10 @@ def rectangle(b_over_a: float, r_over_a: float, twist_axis: str = "x") -> Ring:
     Parameters
     ----------
     b_over_a : float
-        Short half-side over the long one, in (0, 1], at least 1e-6; a is the long one, about
+        Short half-side over the long one, in (0, 1], at least 1e-5; a is the long one, about
         either axis.
     r_over_a : float
-        Radius of the fillets, in (0, b_over_a], at least 1e-6; b_over_a makes a stadium.
+        Radius of the fillets, in (0, b_over_a], at least 1e-5; b_over_a makes a stadium.
     twist_axis : str
         "x": grips at the ends of the short semi-axis; "y": of the long one.
 
@@ -101,7 +105,7 @@ def rectangle(b_over_a: float, r_over_a: float, twist_axis: str = "x") -> Ring:
     -----
     Paper, section 3.3 and figure 5a.
     """
-    b = _semi_minor(b_over_a)
+    b = _semi_minor(b_over_a, SHARPEST)
     across, along = _oriented(b, twist_axis)
     r = _fillet(r_over_a, b, "b_over_a")
     side, fillet = straight(across - r), arc(r, np.pi / 2)
@@ -119,7 +123,7 @@ def triangle(vertex_angle: float, r_over_a: float) -> Ring:
     vertex_angle : float
         Angle at the apex, rad, in (0, pi).
     r_over_a : float
-        Radius of the fillets, in (0, tan(pi/4 - vertex_angle/4)/2], at least 1e-6 and at most that
+        Radius of the fillets, in (0, tan(pi/4 - vertex_angle/4)/2], at least 1e-5 and at most that
         of the inscribed circle. a is the base of the sharp triangle.
 
     Raises
@@ -261,16 +265,16 @@ def ring_from_json(record: Mapping[str, Any]) -> Ring:
     return replace(ring, parameters={**ring.parameters, **data}) if data else ring
 
 
-def _semi_minor(b_over_a: object) -> float:
-    allowed = f"a number in (0, 1], at least {SMALLEST:g}"
-    return checked_number("b_over_a", b_over_a, allowed, lambda b: SMALLEST <= b <= 1)
+def _semi_minor(b_over_a: object, least: float = SMALLEST) -> float:
+    allowed = f"a number in (0, 1], at least {least:g}"
+    return checked_number("b_over_a", b_over_a, allowed, lambda b: least <= b <= 1)
 
 
 def _fillet(r_over_a: object, largest: float, which: str) -> float:
     # A largest fillet that the user computed may differ from ours in rounding, to either side.
-    allowed = f"a number in (0, {largest:.12g}], at least {SMALLEST:g} and at most {which}"
+    allowed = f"a number in (0, {largest:.12g}], at least {SHARPEST:g} and at most {which}"
     limit = largest * (1 + 1e-12)
-    r = checked_number("r_over_a", r_over_a, allowed, lambda r: SMALLEST <= r <= limit)
+    r = checked_number("r_over_a", r_over_a, allowed, lambda r: SHARPEST <= r <= limit)
     return r if r < largest * (1 - 1e-12) else largest
 
 

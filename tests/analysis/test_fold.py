@@ -558,3 +558,16 @@ def test_free_index_of_a_triangle(stretch):
     scene = der.Scene(ring, der.rectangular_section(4.0), stretch=stretch, self_crossings=False)
     at_pi = der.fold(scene).at_pi
     assert (at_pi.index, at_pi.index_moment, at_pi.index_free) == (0, 0, 1)
+
+
+@pytest.mark.parametrize("solve", [der.fold, der.solve_bvp])
+def test_a_path_that_never_folds_is_given_up_by_name(solve):
+    """That of a straight bar bent to a circle runs to -78 rad in 2,000 steps, if it is let."""
+    scene = der.Scene(
+        der.circle(0.0), der.rectangular_section(4.0), n_edges=32, until="folded", stability=False
+    )
+    with pytest.raises(der.NotConverged, match=r"gamma has left -4 pi to 4 pi") as ended:
+        solve(scene)
+    path = ended.value.path
+    assert (path.reason, path.gamma[-1]) == ("unfolded", -4.0 * math.pi)
+    assert len(path) < 600

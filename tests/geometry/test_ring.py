@@ -456,8 +456,11 @@ def test_natural_curvature_of_a_long_piece_is_integrated_exactly():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: circle(math.inf), "natural_curvature must be a finite number, got inf"),
-        (lambda: circle("1"), "natural_curvature must be a finite number, got '1'"),
+        (lambda: circle(math.inf), r"natural_curvature must be .* -1e\+06 to 1e\+06, got inf"),
+        (lambda: circle("1"), r"natural_curvature must be .* -1e\+06 to 1e\+06, got '1'"),
+        (lambda: circle(-1e7), r"natural_curvature must be .*, got -10000000.0"),
+        (lambda: rectangle(1e-6, 1e-6), r"b_over_a must be .*, at least 1e-05, got 1e-06"),
+        (lambda: rectangle(0.5, 1e-6), r"r_over_a must be .*, at least 1e-05 .*, got 1e-06"),
         (lambda: ellipse(0), r"b_over_a must be a number in \(0, 1\], .*, got 0"),
         (lambda: ellipse(1.01), r"b_over_a must be .*, got 1.01"),
         (lambda: ellipse(math.nan), r"b_over_a must be .*, got nan"),
