@@ -17,7 +17,7 @@ import typer
 from der.cli.clone import bench, stress
 from der.cli.figures import figure, phase
 from der.cli.landscapes import landscape
-from der.cli.output import say
+from der.cli.output import open_streams, say
 from der.cli.parsing import add_command, application
 from der.cli.paths import bvp, compare, fold
 from der.cli.states import planar, states
@@ -58,6 +58,7 @@ def leave(commands: typer.Typer, name: str, arguments: list[str]) -> None:
     """Run one of the commands and leave with its exit code; an error is one line."""
     from der.utils.interrupts import interrupts_heard
 
+    open_streams()
     try:
         with interrupts_heard():
             code = _run(commands, name, arguments or ["--help"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path as File
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -20,15 +21,29 @@ Targets: TypeAlias = dict[str, list[File]]  # by option, that of --out first
 Writers: TypeAlias = Mapping[str, Callable[[File], object] | str]  # or why there is nothing to draw
 
 
+def open_streams() -> None:
+    """Put something in the place of closed streams, so that no file takes their numbers.
+
+    What is said on standard error is then lost; the loss of an answer on standard output is told.
+    """
+    if sys.stdout is None:
+        unread = os.open(os.devnull, os.O_RDONLY)  # to write to it is an error
+        sys.stdout = os.fdopen(unread, "w", encoding="utf-8")
+    if sys.stderr is None:
+        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
+
+
 def say(line: str) -> None:
-    """Print on standard error."""
-    print(line, file=sys.stderr)
+    """Print on standard error, if that can be written to."""
+    with suppress(OSError):
+        print(line, file=sys.stderr)
 
 
 def show(text: str) -> bool:
     """Print on standard output; False, and a line on standard error, if it takes no more."""
-    try:
-        print(text, flush=True)
+    encoding = sys.stdout.encoding or "utf-8"
+    try:  # names of files may be no text
+        print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)
     except OSError as wrong:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing more to flush
         if isinstance(wrong, BrokenPipeError):

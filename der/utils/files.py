@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import os
 import pathlib
 import secrets
+import stat
+import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any, BinaryIO, TypeAlias
 
+FORGOTTEN = 3600.0  # s without a change: nobody writes any more
 FilePath: TypeAlias = str | os.PathLike[str]
 
 
@@ -51,18 +56,28 @@ def json_entries(text: str) -> dict[str, Any]:
 def write_whole(path: FilePath, write: Callable[[BinaryIO], object]) -> None:
     """Write a file beside its target and rename it, so that the target is never incomplete.
 
+    A symbolic link stays one: what it points to is replaced. The rights of a file that is replaced
+    are kept. What a killed process leaves is removed when the file is written an hour later.
+
     Raises
     ------
     OSError
         If it cannot be written; a file already there is then unchanged.
     """
-    target = pathlib.Path(path)
+    target = pathlib.Path(os.path.realpath(path))
     if not target.parent.is_dir():
         raise FileNotFoundError(f"cannot save {target}: there is no folder {target.parent}")
     # not tempfile: its files are readable by their owner alone, whatever the umask is
-    beside = target.parent / f".{secrets.token_hex(8)}.tmp"
+    stem = f".{target.name[:100]}"
+    beside = target.with_name(f"{stem}.{secrets.token_hex(8)}.tmp")
+    for left in target.parent.glob(f"{glob.escape(stem)}.{'[0-9a-f]' * 16}.tmp"):
+        with suppress(OSError):
+            if time.time() - left.stat().st_mtime > FORGOTTEN:
+                left.unlink()
     try:
         with beside.open("xb") as file:
+            with suppress(FileNotFoundError):
+                os.chmod(beside, stat.S_IMODE(target.stat().st_mode))
             write(file)
             file.flush()
             os.fsync(file.fileno())
