@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from der.cli.commands import main
+from der.paper import DIAGRAMS, Drawn
 from der.utils.files import write_whole
 from der.utils.kernel_cache import FOLDER, keep_kernels
 
@@ -130,3 +132,61 @@ def test_what_a_killed_process_left_is_removed(tmp_path):
         os.utime(one, (0.0, 0.0))
     put(file)
     assert {*tmp_path.iterdir()} == {file, busy, other}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "fold circle --h-over-t 4 --out a/b --plot x.txt",
+        "fold circle --h-over-t 4 --out a/b --json a/b/path.png",
+        "fold circle --h-over-t 4 --out a/b --rrd nowhere/x.rrd",
+        "fold circle --h-over-t 4 --out a/b --live --port 0",
+        "bvp circle --h-over-t 4 --out a/b --beside c --html x.html",
+        "landscape circle --h-over-t 4 --out a/b --rrd x.png",
+        "states circle --h-over-t 4 --out a/b --edges 7",
+        "phase fig3a --out a/b --workers 0",
+        "phase fig3a --out a/b --sample 0",
+        "figure fig2b --out a/b --workers 0",
+        "figure fig99 --out a/b",
+    ],
+)
+def test_no_folder_is_left_where_a_command_is_refused(words, tmp_path, monkeypatch, capsys):
+    """Code 2, one line, and nothing on the disk."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(words.split())
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not os.listdir(tmp_path)
+
+
+def test_figure_says_at_ctrl_c_what_was_drawn(tmp_path, monkeypatch, capsys):
+    """Code 130; of a diagram that was begun, where its cases are."""
+
+    def pressed(*_):
+        raise KeyboardInterrupt("7 cases are in x")
+
+    done = Drawn({"fig2b": [tmp_path / "fig2b.png"]}, {})
+    monkeypatch.setattr("der.paper.figures.draw_all", lambda *_: done)
+    monkeypatch.setitem(DIAGRAMS, "fig3a", pressed)
+    with pytest.raises(SystemExit) as ended:
+        main(["figure", "fig2b", "fig3a", "fig5a", "--out", str(tmp_path)])
+    said = capsys.readouterr()
+    assert ended.value.code == 130
+    assert said.out == f"{tmp_path / 'fig2b.png'}\n"
+    assert said.err == (
+        "der: stopped by the user; drawn: fig2b; not drawn: fig3a, fig5a; 7 cases are in x\n"
+    )
+
+
+def test_phase_says_at_ctrl_c_where_its_cases_are(tmp_path, monkeypatch, capsys):
+    """And not that nothing was found."""
+
+    def pressed(*_, **options):
+        raise KeyboardInterrupt("7 cases are in x")
+
+    monkeypatch.setattr("der.diagram.diagram.phase_diagram", pressed)
+    with pytest.raises(SystemExit) as ended:
+        main(["phase", "fig3a", "--out", str(tmp_path)])
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "der: stopped by the user; 7 cases are in x\n"

@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path as File
 
@@ -37,14 +38,14 @@ def benchmark(wanted: BenchOptions) -> int:
     with options_named():
         check_named(json=wanted.json, out=wanted.out)
         file = _writable(wanted.json)
-        folder = None if wanted.out is None else made_folder(wanted.out)
-        if folder is not None:
-            check_writable("json", folder / "bench.json")
         from validation.benchmark.run import PARTS, run
 
         only = wanted.only
         parts = PARTS if only is None else tuple(part.strip() for part in only.split(","))
-        run(file, out=folder, quick=wanted.quick, only=parts)
+        with nullcontext() if wanted.out is None else made_folder(wanted.out) as folder:
+            if folder is not None:
+                check_writable("json", folder / "bench.json")
+            run(file, out=folder, quick=wanted.quick, only=parts)
     return 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import MISSING, dataclass
 from pathlib import Path as File
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -11,6 +12,9 @@ from der.cli.files import check_named
 from der.cli.options import NU
 from der.cli.output import say, show
 from der.cli.parsing import argument, folder_option, option, options_named
+
+if TYPE_CHECKING:
+    from der.paper import Interrupted
 
 PHASES = {  # the diagrams of each shape, that of a cube last
     "ellipse": ("fig3a",),
@@ -41,6 +45,7 @@ def figure(wanted: FigureOptions) -> int:
             drawn = draw(names, wanted.out, workers=wanted.workers, warn=_warn)
         except Interrupted as stopped:
             drawn, code = stopped.drawn, 130
+            say(_stopped(names, stopped))
         else:
             code = 3 if drawn.failed else 0
     for files in drawn.written.values():
@@ -49,6 +54,15 @@ def figure(wanted: FigureOptions) -> int:
     for name, reason in drawn.failed.items():
         say(f"der: {name} failed: {reason}")
     return code
+
+
+def _stopped(names: list[str], stopped: Interrupted) -> str:
+    """What was drawn before Ctrl-C, and what was not."""
+    done = [name for name in names if name in stopped.drawn.written]
+    left = [name for name in names if name not in {*done, *stopped.drawn.failed}]
+    kept = f"; {stopped}" if str(stopped) else ""
+    drawn = f"drawn: {', '.join(done) or 'none'}; not drawn: {', '.join(left) or 'none'}"
+    return f"der: stopped by the user; {drawn}{kept}"
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ Every command has its own group of them; `targets` turns any group into files by
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
@@ -113,13 +115,18 @@ def targets(options: Any, stem: str, *, shapes: bool = False) -> Targets:
     names = ("json", "plot", "rrd", "movie", "html")
     named = {name: getattr(options, name, None) for name in names}
     check_named(**named, out=options.out)
-    files: Targets = {}
-    if options.out is not None:
-        folder = made_folder(options.out)
-        files = {"json": [folder / f"{stem}.json"], "plot": [folder / f"{stem}.png"]}
+    _check_suffixes(named)
+    if options.out is None:
+        return _checked(named, {})
+    with made_folder(options.out) as folder:
+        files: Targets = {"json": [folder / f"{stem}.json"], "plot": [folder / f"{stem}.png"]}
         if shapes:
             files["shapes"] = [folder / "shapes.npz"]
-    _check_suffixes(named)
+        return _checked(named, files)
+
+
+def _checked(named: dict[str, str | None], files: Targets) -> Targets:
+    """The files of a folder and those named, after making sure that they can be written."""
     for name, given in named.items():
         if given is not None and File(given) not in files.setdefault(name, []):
             files[name].append(File(given))
@@ -141,13 +148,22 @@ def check_named(**given: str | None) -> None:
             raise ValueError(f"{name} must be a file name, got {value!r}")
 
 
-def made_folder(out: str) -> File:
-    """The folder of --out, made if it is not there."""
+@contextmanager
+def made_folder(out: str) -> Iterator[File]:
+    """The folder of --out, made if it is not there, and not left behind where it is refused."""
+    folder = File(out)
+    made = [one for one in (folder, *folder.parents) if not one.exists()]
     try:
-        File(out).mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as wrong:
         raise ValueError(f"out must be a folder, got {out!r}: {wrong.strerror}") from None
-    return File(out)
+    try:
+        yield folder
+    except ValueError:
+        with suppress(OSError):  # of one that is not empty
+            for one in made:
+                one.rmdir()
+        raise
 
 
 def _check_suffixes(named: dict[str, str | None]) -> None:

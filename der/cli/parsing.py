@@ -109,8 +109,9 @@ def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
         }
         try:
             code = function(**made)
-        except KeyboardInterrupt:  # typer would say nothing
-            say("der: stopped by the user before anything was found")
+        except KeyboardInterrupt as stopped:  # typer would say nothing
+            kept = f"; {stopped}" if str(stopped) else " before anything was found"
+            say(f"der: stopped by the user{kept}")
             code = 130
         raise typer.Exit(code)
 

@@ -32,8 +32,8 @@ def fold(ring: RingOptions, path: PathOptions, files: PathFiles, watch: LiveOpti
             modes=playback and path.stability and path.solver == "newton",
             forces=files.forces,
         )
-        written = targets(files, "path", shapes=True)
         serving = served(watch.port) if watch.live else nullcontext()
+        written = targets(files, "path", shapes=True)
     with serving as live:
 
         def solve(tick: Tick) -> der.Path:
@@ -55,8 +55,8 @@ def bvp(ring: RingOptions, path: PathOptions, files: PathFiles) -> int:
         kept = {"shapes": files.drawn, "forces": files.forces}
         scene = path.scene(ring, **kept, error_bars=False, tolerance=1e-10)
         check(scene, tolerance)
-        written = targets(files, "path", shapes=True)
         other = files.other()
+        written = targets(files, "path", shapes=True)
 
     def solve(tick: Tick) -> der.Path:
         return der.solve_bvp(scene, tolerance=tolerance, progress=tick)

@@ -137,9 +137,9 @@ def phase_diagram(
     wanted = family(name, nu=nu, ranges=ranges, finest=finest)
     if isinstance(sample, bool) or not isinstance(sample, int) or sample < 1:
         raise ValueError(f"sample must be an integer from 1, got {sample!r}")
-    folder = _made(folder)
+    folder = File(folder)
     clock = [time.perf_counter()]  # at the start, and after each part
-    with Store(folder / STORE) as store, started(workers, scheduler) as crew:
+    with started(workers, scheduler) as crew, Store(_made(folder) / STORE) as store:
         if len(store) and not resume:
             raise ValueError(
                 f"resume must be asked for in a folder that has cases, {folder} has {len(store)}"

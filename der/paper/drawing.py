@@ -30,15 +30,15 @@ class Drawn:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C while figures are drawn.
+    """Ctrl-C while figures are drawn; its text says what is kept of one that was not finished.
 
     Attributes
     ----------
     drawn : those that were finished.
     """
 
-    def __init__(self, drawn: Drawn) -> None:
-        super().__init__("interrupted")
+    def __init__(self, drawn: Drawn, kept: str = "") -> None:
+        super().__init__(kept)
         self.drawn = drawn
 
 

@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path as File
 from typing import TypeAlias
 
-from der.paper.drawing import Drawn, draw_all
+from der.paper.drawing import Drawn, Interrupted, draw_all
 from der.utils.files import FilePath
 
 Draw: TypeAlias = Callable[[FilePath], list[File]]
@@ -101,5 +101,11 @@ def draw(
         if name not in known:
             raise ValueError(f"name must be one of {', '.join(known)}, got {name!r}")
     drawn = draw_all({name: FIGURES[name] for name in names if name in FIGURES}, folder, workers)
-    diagrams = {name: DIAGRAMS[name](folder, workers, warn) for name in names if name in DIAGRAMS}
-    return Drawn({**drawn.written, **diagrams}, drawn.failed)
+    written = dict(drawn.written)
+    try:
+        for name in names:
+            if name in DIAGRAMS:
+                written[name] = DIAGRAMS[name](folder, workers, warn)
+    except KeyboardInterrupt as stopped:
+        raise Interrupted(Drawn(written, drawn.failed), str(stopped)) from None
+    return Drawn(written, drawn.failed)
