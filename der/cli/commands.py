@@ -45,8 +45,15 @@ def _top(
     """Discrete elastic rods for rings that fold by twisting."""
 
 
+# options of a path that only `fold` takes, but for their default values
+_OF_FOLD = ("control", "unload", "solver", "error_bars")
+_REFUSED = {
+    "bvp": (*_OF_FOLD, "stretch"),
+    "compare": (*_OF_FOLD, "stretch"),
+    "landscape": (*_OF_FOLD, "gamma_max"),
+}
 for _command in COMMANDS:
-    add_command(app, _command)
+    add_command(app, _command, _REFUSED.get(_command.__name__, ()))
 
 
 def main(arguments: list[str] | None = None) -> None:

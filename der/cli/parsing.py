@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import inspect
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import MISSING, field, fields
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
@@ -19,10 +20,13 @@ import typer
 from der.cli.output import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Collection, Iterator, Mapping
     from dataclasses import Field
 
-_OPTIONS = {"n_edges": "--edges", "twist_axis": "--axis", "file": "FILE"}  # named otherwise
+# fields of options by arguments of the package that are named otherwise
+_FIELDS = {"n_edges": "edges", "twist_axis": "axis", "folder": "out", "ranges": "span"}
+_FIELDS |= {"name": "names", "range": "span"}
+_LABELS: ContextVar[Mapping[str, str]] = ContextVar("labels")  # of the command that runs, by field
 
 
 def option(
@@ -78,12 +82,13 @@ def numbers(name: str, text: str | None) -> tuple[float, ...] | None:
 
 @contextmanager
 def options_named() -> Iterator[None]:
-    """Turn a ValueError about an argument into one about the option of that name."""
+    """Turn a ValueError about an argument into one about the command's option for it."""
     try:
         yield
     except ValueError as wrong:
         name, *words = str(wrong).split(" ", 1)
-        named = _OPTIONS.get(name, f"--{name.replace('_', '-')}")
+        labels = _LABELS.get({})
+        named = labels.get(name) or labels.get(_FIELDS.get(name, ""), name)
         raise typer.TyperException(" ".join([named, *words])) from None
 
 
@@ -94,15 +99,23 @@ def application(text: str) -> typer.Typer:
     )
 
 
-def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
+def add_command(
+    app: typer.Typer, function: Callable[..., int], refused: Collection[str] = ()
+) -> None:
     """Add a command: a function of groups of options that returns the exit code.
 
     Its options are the fields of the groups, so that commands share options and not text.
+
+    Parameters
+    ----------
+    refused : fields that it allows to have their default value only; its help does not show them.
     """
     groups = get_type_hints(function)
     del groups["return"]
+    labels = {one.name: _label(one) for group in groups.values() for one in fields(group)}
 
     def run(**given: Any) -> None:
+        _LABELS.set(labels)
         made = {
             name: group(**{f.name: given[f.name] for f in fields(group)})
             for name, group in groups.items()
@@ -116,7 +129,7 @@ def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
         raise typer.Exit(code)
 
     parameters = [
-        _parameter(one, get_type_hints(group)[one.name])
+        _parameter(one, get_type_hints(group)[one.name], hidden=one.name in refused)
         for group in groups.values()
         for one in fields(group)
     ]
@@ -126,7 +139,15 @@ def add_command(app: typer.Typer, function: Callable[..., int]) -> None:
     app.command(name=function.__name__.replace("_", "-"))(run)
 
 
-def _parameter(one: Field[Any], hint: Any) -> inspect.Parameter:
+def _label(one: Field[Any]) -> str:
+    """How a field is called on the command line: "--range", "SHAPE"."""
+    found = one.metadata.get("argument")
+    if found is not None:
+        return str(found.metavar).strip("[].")
+    return str(one.metadata["name"] or f"--{one.name.replace('_', '-')}")
+
+
+def _parameter(one: Field[Any], hint: Any, *, hidden: bool) -> inspect.Parameter:
     """A field of a group as typer reads it."""
     found = one.metadata.get("argument")
     if found is None:
@@ -137,7 +158,7 @@ def _parameter(one: Field[Any], hint: Any) -> inspect.Parameter:
         parsers = [_PARSERS[kind] for kind in get_args(hint) or (hint,) if kind in _PARSERS]
         parser = parsers[0] if parsers else None
         text, metavar = one.metadata["help"], one.metadata["metavar"]
-        found = typer.Option(*names, parser=parser, metavar=metavar, help=text)
+        found = typer.Option(*names, parser=parser, metavar=metavar, help=text, hidden=hidden)
     default = inspect.Parameter.empty if one.default is MISSING else one.default
     kind = inspect.Parameter.KEYWORD_ONLY
     return inspect.Parameter(one.name, kind, default=default, annotation=Annotated[hint, found])
