@@ -46,9 +46,9 @@ def circle(natural_curvature: float = 1.0) -> Ring:
     Raises
     ------
     ValueError
-        If `natural_curvature` is not a number from -1e6 to 1e6.
+        If `natural_curvature` is not a number from -1e8 to 1e8.
     """
-    largest = 1.0 / SMALLEST
+    largest = 1e8  # energies go with its square
     allowed = f"a finite number from {-largest:g} to {largest:g}"
     natural_curvature = checked_number(
         "natural_curvature", natural_curvature, allowed, lambda k: abs(k) <= largest

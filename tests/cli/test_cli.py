@@ -221,7 +221,7 @@ WRONG = [
     (("phase", "ellipse", "--out", "d", "--check", "rod"), "--check", "'rod'", "'der'"),
     (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
     (("phase", "ellipse", "--out", "d", "--range", "x=1:2"), "--range", "'x'", "h_over_t"),
-    (("figure", "fig99", "--out", "."), "--name", "'fig99'", "fig2b"),
+    (("figure", "fig99", "--out", "."), "NAME", "'fig99'", "fig2b"),
     ((*BAR, "--young", "3.5"), "--young", "'3.5'", "such as 3.5GPa"),
     ((*BAR, "--size", "100"), "--size", "'100'", "such as 100mm"),
     ((*BAR, "--size", "0.5mm"), "--size", "'0.5mm'", "times the thickness"),
