@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from der.analysis.multistability.states import states
     from der.analysis.planar.planar_states import planar
     from der.analysis.planar.squeeze import squeeze
-    from der.bvp.packing import packing_ratio
+    from der.bvp.planar.packing import packing_ratio
     from der.bvp.solve import solve_bvp
     from der.continuation.arclength import follow
     from der.continuation.events import Events
@@ -76,7 +76,7 @@ _NAMES = {  # by the module where they live
     "der.analysis.multistability.states": "states",
     "der.analysis.planar.planar_states": "planar",
     "der.analysis.planar.squeeze": "squeeze",
-    "der.bvp.packing": "packing_ratio",
+    "der.bvp.planar.packing": "packing_ratio",
     "der.bvp.solve": "solve_bvp",
     "der.continuation.arclength": "follow",
     "der.continuation.events": "Events",

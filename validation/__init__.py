@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from der import Comparison, compare, packing_ratio
     from der import solve_bvp as solve
-    from der.bvp.folded_shape import Folded, folded
+    from der.bvp.planar.folded_shape import Folded, folded
     from der.paper import draw
 
 __all__ = ["Comparison", "Folded", "compare", "draw", "folded", "packing_ratio", "solve"]
 
 _HOME = {
     "Comparison": ("der.analysis.compare", "Comparison"),
-    "Folded": ("der.bvp.folded_shape", "Folded"),
+    "Folded": ("der.bvp.planar.folded_shape", "Folded"),
     "compare": ("der.analysis.compare", "compare"),
     "draw": ("der.paper", "draw"),
-    "folded": ("der.bvp.folded_shape", "folded"),
-    "packing_ratio": ("der.bvp.packing", "packing_ratio"),
+    "folded": ("der.bvp.planar.folded_shape", "folded"),
+    "packing_ratio": ("der.bvp.planar.packing", "packing_ratio"),
     "solve": ("der.bvp.solve", "solve_bvp"),
 }
 

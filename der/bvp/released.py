@@ -30,9 +30,9 @@ from typing import NamedTuple
 import numpy as np
 
 from der.bvp.collocation import Collocation, Solution
-from der.bvp.folded_half import folded_half
 from der.bvp.full_ring import directors, moments
 from der.bvp.gauss import Array, interpolation, rule
+from der.bvp.planar.folded_half import folded_half
 from der.geometry.ring import Ring
 from der.geometry.section import Section
 

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from der.bvp.folded_shape import folded
-from der.bvp.packing import packing_ratio
+from der.bvp.planar.folded_shape import folded
+from der.bvp.planar.packing import packing_ratio
 from der.bvp.released import index_free, planar_shape, stiffnesses
 from der.geometry.ring import Ring
 from der.geometry.section import rectangular_section

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
-from functools import cache
+from functools import cache, partial
 from inspect import isclass
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
@@ -52,21 +52,10 @@ def record_of(kind: type[Kind], values: Any) -> Kind:
 @cache
 def _converter() -> Any:
     """The converter, with hooks for entries, tuples and objects."""
-    from cattrs import BaseValidationError, Converter
+    from cattrs import Converter
     from cattrs.gen import make_dict_structure_fn, override
 
     converter = Converter(detailed_validation=True)
-
-    def of_tuple(hint: Any) -> Callable[[Any, Any], Any]:
-        kind = get_args(hint)[0]
-
-        def one(place: int, value: Any) -> Any:
-            try:
-                return converter.structure(value, kind)
-            except (BaseValidationError, ValueError) as problem:  # the first ends the list
-                raise _InList(f"[{place}]") from problem
-
-        return lambda value, _: tuple(one(*pair) for pair in enumerate(_a(list, value)))
 
     def of_object(kind: Any) -> Callable[[Any, Any], Any]:
         hints = get_type_hints(kind, include_extras=True)
@@ -86,7 +75,7 @@ def _converter() -> Any:
         return read
 
     # the last one that fits is taken
-    converter.register_structure_hook_factory(_is_tuple, of_tuple)
+    converter.register_structure_hook_factory(_is_tuple, partial(_tuple_reader, converter))
     converter.register_structure_hook_factory(
         lambda hint: isclass(hint) and issubclass(hint, Checked), of_object
     )
@@ -94,6 +83,21 @@ def _converter() -> Any:
         lambda hint: not _is_tuple(hint) and entry_of(hint) is not None, lambda value, _: value
     )
     return converter
+
+
+def _tuple_reader(converter: Any, hint: Any) -> Callable[[Any, Any], Any]:
+    """What reads a list of entries of one kind, up to the first wrong one."""
+    from cattrs import BaseValidationError
+
+    kind = get_args(hint)[0]
+
+    def one(place: int, value: Any) -> Any:
+        try:
+            return converter.structure(value, kind)
+        except (BaseValidationError, ValueError) as problem:
+            raise _InList(f"[{place}]") from problem
+
+    return lambda value, _: tuple(one(*pair) for pair in enumerate(_a(list, value)))
 
 
 def _is_tuple(hint: Any) -> bool:

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import der
-from der.bvp.folded_half import bent_by_force, uniform_bending
-from der.bvp.folded_shape import folded
+from der.bvp.planar.folded_half import bent_by_force, uniform_bending
+from der.bvp.planar.folded_shape import folded
 
 RECTANGLES = [(0.2, 0.1), (0.6, 0.3), (1.0, 0.1), (0.5, 0.5)]
 TRIANGLES = [(30, 0.033), (45, 0.2), (60, 0.05), (60, 0.2), (75, 0.033), (120, 1 / 30)]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import der
-from der.bvp.folded_shape import Folded, folded
-from der.bvp.packing import envelope_area, natural_area, packing_ratio
+from der.bvp.planar.folded_shape import Folded, folded
+from der.bvp.planar.packing import envelope_area, natural_area, packing_ratio
 from der.paper.packing import fig3b, fig6, fig9
 
 

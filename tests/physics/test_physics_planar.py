@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 from shapes import crescent
 
 import der
-from der.bvp.folded_shape import folded
-from der.bvp.packing import packing_ratio
+from der.bvp.planar.folded_shape import folded
+from der.bvp.planar.packing import packing_ratio
 
 SECTION = der.rectangular_section(4.0)
 ALPHA = SECTION.alpha

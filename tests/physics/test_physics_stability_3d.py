@@ -348,7 +348,7 @@ def test_where_a_ring_goes_that_loses_its_symmetry(ring, h_over_t, folded_energy
 
 def planar_least(ring, section, n_edges):
     """The planar three-covered shape of least bending energy, as an equilibrium in the grips."""
-    from der.bvp.folded_half import bent_by_force
+    from der.bvp.planar.folded_half import bent_by_force
 
     gripped = gripped_ring(ring, section, n_edges)
     a = 0.5 * (bent_by_force(ring).angle(gripped.arc_length) - 0.5 * np.pi)

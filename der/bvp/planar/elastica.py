@@ -1,6 +1,6 @@
 """The reduced planar rod on half a ring, by Newton's method and continuation from the circle.
 
-Equations and symbols are those of `der.bvp.folded_half`.
+Equations and symbols are those of `der.bvp.planar.folded_half`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from der.bvp.gauss import Array
-from der.bvp.panels import Panels
+from der.bvp.planar.panels import Panels
 
 FOLDED_TURN = 6 * np.pi  # of the three-covered ring
 # Steps of the homotopy; steps of 0.5 have missed branches of least energy.

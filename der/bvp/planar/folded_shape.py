@@ -7,9 +7,9 @@ from operator import index
 
 import numpy as np
 
-from der.bvp.folded_half import NotFolded, folded_half
 from der.bvp.gauss import Array
-from der.bvp.planar_elastica import FOLDED_TURN
+from der.bvp.planar.elastica import FOLDED_TURN
+from der.bvp.planar.folded_half import NotFolded, folded_half
 from der.geometry.ring import Ring
 
 __all__ = ["Folded", "NotFolded", "folded"]

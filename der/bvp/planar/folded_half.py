@@ -32,8 +32,8 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from der.bvp.gauss import Array
-from der.bvp.panels import NODES, TO_SERIES, Panels
-from der.bvp.planar_elastica import FOLDED_TURN, followed
+from der.bvp.planar.elastica import FOLDED_TURN, followed
+from der.bvp.planar.panels import NODES, TO_SERIES, Panels
 from der.geometry.outline import ComplexArray, PiecewiseLinear
 from der.geometry.ring import Ring
 

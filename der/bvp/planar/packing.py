@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from der.bvp.folded_shape import Folded, folded
+from der.bvp.planar.folded_shape import Folded, folded
 from der.geometry.ring import Ring
 
 Array = NDArray[np.float64]
