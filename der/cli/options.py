@@ -104,10 +104,10 @@ class RingOptions:
 
         for name in ("h_over_t", "alpha", "beta"):
             if (value := getattr(self, name)) is not None:
-                raise ValueError(f"{name} cannot be given together with --young, got {value}")
+                raise ValueError(f"{name} cannot be given together with --{given[0]}, got {value}")
         if self.a_over_t != A_OVER_T:
             raise ValueError(
-                f"a_over_t cannot be given together with --young, got {self.a_over_t}: "
+                f"a_over_t cannot be given together with --{given[0]}, got {self.a_over_t}: "
                 "it is --size over --thickness"
             )
         for name, example in zip(MEASURES, ("3.5GPa", "10mm", "1mm", "100mm"), strict=True):

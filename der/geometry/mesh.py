@@ -24,6 +24,7 @@ from der.geometry.ring import Ring
 CLOSE = 1e-12  # of the length: joints nearer to an end than this are that end
 FEW = 1e-3  # of a cell's share: a segment with less has no cell
 SLIGHT = 1e-9  # of the curvature over the length: smaller jumps of its slope are rounding
+UNEVEN = 2.0  # times its share: the most that a cell may have for the sake of kinks
 STRONG = 0.1  # of the strongest kink: weaker ones may lie inside of cells
 SAMPLES = 256  # of the density in a segment whose curvature varies
 
@@ -41,7 +42,7 @@ def sites(ring: Ring, n_edges: int, name: str, finest: int | None = None) -> Arr
     -----
     The sites have the ring's symmetry: those of a half are those of a quarter and their mirror
     image. Where there are fewer cells than segments, jumps of curvature lie inside of cells, which
-    see their mean. Where there are more kinks than cells of N/4 edges, weak ones lie inside of
+    see their mean. Where cells of N/4 edges are too few for all kinks, weak ones lie inside of
     cells, or all of them; `natural_turning` makes up for that.
     """
     length = ring.length
@@ -133,9 +134,20 @@ def _joints(
     size[np.isin(at, joints)] = 0.0
     for share in (0.0, STRONG):
         strong = at[size > share * size.max(initial=0.0)].tolist()
-        if 0 < len(strong) <= _quarter(finest) - (len(joints) - 1):
-            return sorted([*joints, *strong]), True
+        tried = sorted([*joints, *strong])
+        if strong and _is_even(ring, tried, _quarter(finest)):
+            return tried, True
     return joints, False
+
+
+def _is_even(ring: Ring, joints: list[float], n_cells: int) -> bool:
+    """Whether cells between these joints share the density as without them, but for a factor."""
+    if n_cells < len(joints) - 1:
+        return False
+    weights = [_segment(ring, a, b).weight for a, b in pairwise(joints)]
+    counts = _shared(weights, n_cells)
+    most = max(weight / count for weight, count in zip(weights, counts, strict=True))
+    return most * n_cells <= UNEVEN * sum(weights)
 
 
 def _quarter(finest: int) -> int:
@@ -176,7 +188,7 @@ class _Segment:
         return np.interp(np.linspace(0.0, self.weight, count + 1), self.share, self.s)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def _segment(ring: Ring, begin: float, end: float) -> _Segment:
     """A segment, remembered: the meshes of a ring's error bars share it."""
     return _Segment(ring, begin, end)

@@ -27,7 +27,7 @@ NORMAL = 0.6745  # the median size of normal errors, in standard deviations
 COARSE = 4  # grid steps: points nearer to each other are replaced by their mean
 SAMPLED = 10_000  # coordinates among which a grid is sought
 PLANAR = 1e-3  # of the extent
-SIZES = 1e-100, 1e100  # of extents: squares of others are not numbers
+SMALLEST = 1e-100  # extent: squares of others are not numbers
 
 
 def planar_points(points: ArrayLike) -> tuple[ComplexArray, float]:
@@ -47,10 +47,9 @@ def planar_points(points: ArrayLike) -> tuple[ComplexArray, float]:
     xyz = checked_array("points", points, ("n", "m"))
     if xyz.shape[1] not in (2, 3):
         raise ValueError(f"points must have shape (n, 2) or (n, 3), got {xyz.shape}")
-    with np.errstate(over="ignore"):
-        extent = float(np.max(np.ptp(xyz, axis=0), initial=0.0)) if len(xyz) else 0.0
-    if len(xyz) >= FEWEST and not SIZES[0] < extent < SIZES[1]:
-        raise ValueError(f"points must have an extent from 1e-100 to 1e100, got {extent:g}")
+    extent = float(np.max(np.ptp(xyz, axis=0))) if len(xyz) else 0.0
+    if len(xyz) >= FEWEST and not extent > SMALLEST:
+        raise ValueError(f"points must have an extent > {SMALLEST:g}, got {extent:g}")
     grid = min((_grid(column) for column in xyz.T if np.ptp(column) > 0), default=0.0)
     xy = xyz if xyz.shape[1] == 2 else _in_plane(xyz, extent, grid)
     z = _once_each(xy[:, 0] + 1j * xy[:, 1], grid)

@@ -233,8 +233,12 @@ def _named(prefix: str, record: Fall | Softest | Internal) -> dict[str, Array]:
     return {f"{prefix}/{name}": np.asarray(value) for name, value in vars(record).items()}
 
 
-_SNAP, _MODES = ("|".join(entry.name for entry in fields(kind)) for kind in (Fall, Softest))
-_NAMES = re.compile(rf"x|frames|arc_length|falls/\d{{1,6}}/({_SNAP})|softest/({_MODES})")
+_SNAP, _MODES, _INSIDE = (
+    "|".join(entry.name for entry in fields(kind)) for kind in (Fall, Softest, Internal)
+)
+_NAMES = re.compile(
+    rf"x|frames|arc_length|falls/\d{{1,6}}/({_SNAP})|softest/({_MODES})|internal/({_INSIDE})"
+)
 
 
 def _falls(arrays: Mapping[str, Array]) -> tuple[Fall, ...]:

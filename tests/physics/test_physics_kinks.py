@@ -13,7 +13,7 @@ from shapes import kinked, scene, through_points
 import der
 from der.analysis.compare import compare
 
-FORCES = {"kinks": -3.602950948, "ellipse of 8": -3.227083591, "three lobes of 24": -4.79684059}
+FORCES = {"kinks": -3.602950948, "ellipse of 8": -3.236259779, "three lobes of 24": -4.807870834}
 
 
 def ellipse_of_8() -> der.Ring:

@@ -87,7 +87,7 @@ def test_holes_are_filled():
         (der.ellipse(0.3, "y"), 0.3 * np.pi),
         (der.rectangle(0.5, 0.5), 1.0 + np.pi / 4),
         (triangle(60, np.tan(np.pi / 6) / 2), np.pi / 12),
-        (triangle(60, 1e-6), np.sqrt(3) / 4),
+        (triangle(60, 1e-5), np.sqrt(3) / 4 - (3 * np.sqrt(3) - np.pi) * 1e-10),
     ],
     ids=str,
 )

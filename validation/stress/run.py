@@ -59,6 +59,7 @@ EXPLAINED = frozenset(
         Reason.NOT_AT_REST,
         Reason.NO_MINIMUM,
         Reason.INACCURATE,
+        Reason.UNFOLDED,
     }
 )
 NOT_EXPLAINED = frozenset({Reason.CONVERGED, Reason.TURNED_BACK, Reason.INTERRUPTED})
