@@ -5,6 +5,7 @@ Every command has its own group of them; `targets` turns any group into files by
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -142,9 +143,11 @@ def _checked(named: dict[str, str | None], files: Targets) -> Targets:
 
 
 def check_named(**given: str | None) -> None:
-    """Raise ValueError where the next option was taken for a file's name."""
+    """Raise ValueError where there is no name, or the next option was taken for one."""
     for name, value in given.items():
-        if value is not None and value.startswith("-") and (name, value) != ("json", "-"):
+        if value is None or (name, value) == ("json", "-"):
+            continue
+        if not value or value.startswith("-"):
             raise ValueError(f"{name} must be a file name, got {value!r}")
 
 
@@ -193,7 +196,9 @@ def check_writable(name: str, file: File) -> None:
     if file.exists() and not file.is_file():  # it would be replaced by a file: /dev/null!
         raise ValueError(f"{name} must be a regular file, got {str(file)!r}")
     try:
-        with tempfile.TemporaryFile(dir=file.parent):
+        with suppress(FileNotFoundError):
+            file.stat()  # not of a link to itself, nor with too long a name
+        with tempfile.TemporaryFile(dir=File(os.path.realpath(file)).parent):
             pass
     except OSError as wrong:
         raise ValueError(

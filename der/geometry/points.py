@@ -27,7 +27,7 @@ NORMAL = 0.6745  # the median size of normal errors, in standard deviations
 COARSE = 4  # grid steps: points nearer to each other are replaced by their mean
 SAMPLED = 10_000  # coordinates among which a grid is sought
 PLANAR = 1e-3  # of the extent
-SMALLEST = 1e-100  # extent: squares of others are not numbers
+SMALLEST = 1e-100  # extent: squares of smaller ones are not numbers
 
 
 def planar_points(points: ArrayLike) -> tuple[ComplexArray, float]:
@@ -47,9 +47,9 @@ def planar_points(points: ArrayLike) -> tuple[ComplexArray, float]:
     xyz = checked_array("points", points, ("n", "m"))
     if xyz.shape[1] not in (2, 3):
         raise ValueError(f"points must have shape (n, 2) or (n, 3), got {xyz.shape}")
-    extent = float(np.max(np.ptp(xyz, axis=0))) if len(xyz) else 0.0
-    if len(xyz) >= FEWEST and not extent > SMALLEST:
-        raise ValueError(f"points must have an extent > {SMALLEST:g}, got {extent:g}")
+    extent = float(np.max(np.ptp(xyz, axis=0), initial=0.0)) if len(xyz) else 0.0
+    if len(xyz) >= FEWEST and extent < SMALLEST:
+        raise ValueError(f"points must have an extent of at least {SMALLEST:g}, got {extent:g}")
     grid = min((_grid(column) for column in xyz.T if np.ptp(column) > 0), default=0.0)
     xy = xyz if xyz.shape[1] == 2 else _in_plane(xyz, extent, grid)
     z = _once_each(xy[:, 0] + 1j * xy[:, 1], grid)
@@ -105,7 +105,8 @@ def _error_between(z: ComplexArray) -> float:
     u = np.append(0.0, np.cumsum(np.abs(np.diff(np.append(z, z[0])))))
     rate = _interpolated(u[::2], np.append(z[::2], z[0]))[1]
     at, direction = rate(u[1::2], 0), rate(u[1::2], 1)
-    return float(np.median(np.abs((np.conj(direction) * (z[1::2] - at)).imag / np.abs(direction))))
+    speed = np.maximum(np.abs(direction), np.finfo(float).tiny)  # 0 at cusps
+    return float(np.median(np.abs((np.conj(direction) * (z[1::2] - at)).imag / speed)))
 
 
 def _in_plane(xyz: Array, extent: float, grid: float) -> Array:
@@ -170,6 +171,8 @@ def joined(z: ComplexArray, grid: float) -> tuple[Bends, ComplexArray]:
     samples = np.arange(pieces * (len(knots) - 1) + 1) / pieces
     u = np.interp(samples, np.arange(len(knots)), knots)
     velocity, acceleration = rate(u, 1), rate(u, 2)
+    if not np.abs(velocity).min() > 0:  # a smooth curve near noise may shrink to a point
+        raise ValueError("points must be in order along a smooth closed curve, got one with cusps")
     k = (np.conj(velocity) * acceleration).imag / np.abs(velocity) ** 3
     node, weight = np.polynomial.legendre.leggauss(8)
     step = np.diff(u)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -14,6 +15,7 @@ from der.geometry.scale import LENGTHS, number_and_unit
 from der.geometry.shapes import DATA, profile
 from der.geometry.table import read_table
 from der.utils.checks import shown
+from der.utils.files import content
 
 if TYPE_CHECKING:
     from der.geometry.ring import Ring
@@ -33,6 +35,7 @@ PLACES = (
     ("y", "z"),
 )  # names of the coordinates of points
 LARGEST = 2**27  # bytes: three million points
+MOST = 6_000_000  # lines and commas of a file: twice a million points
 ALIKE = 3.0  # a over half the larger extent, or the inverse
 
 
@@ -62,15 +65,11 @@ def read_profile(file: str, twist_axis: str | None = None, size: str | None = No
     """
     path, first = Path(file), ""
     try:
-        with path.open("rb") as opened:
-            content = opened.read(LARGEST + 1)
+        text = _decoded(content(path, LARGEST))
     except OSError as wrong:
         raise ValueError(f"file must be readable, got {file!r}: {wrong.strerror}") from None
-    if len(content) > LARGEST:
-        raise ValueError(f"file must have at most {LARGEST} bytes, got more in {file!r}")
-    text = _decoded(content)
-    if text is None:
-        raise ValueError(f"file must be a text file, got {file!r}")
+    except ValueError as wrong:
+        raise ValueError(f"file {wrong}, got {file!r}") from None
     try:
         if path.suffix == ".json":
             given = _of_json(text)
@@ -104,16 +103,21 @@ def _sized(ring: Ring, size: str) -> Ring:
     return replace(same, parameters={**same.parameters, **data, "reference_length": a})
 
 
-def _decoded(content: bytes) -> str | None:
-    """Return the text of a file, None where it is none."""
-    encodings = ["utf-16"] if content[:2] in (b"\xff\xfe", b"\xfe\xff") else ["utf-8-sig", "cp1252"]
+def _decoded(read: bytes) -> str:
+    """Return the text of a file, which must be one of no more numbers than can be many points."""
+    encodings = ["utf-16"] if read[:2] in (b"\xff\xfe", b"\xfe\xff") else ["utf-8-sig", "cp1252"]
     for encoding in encodings:
-        try:
-            text = content.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return None if "\0" in text else text
-    return None
+        with suppress(UnicodeDecodeError):
+            text = read.decode(encoding)
+            break
+    else:
+        text = "\0"
+    if "\0" in text:
+        raise ValueError("must be a text file")
+    marks = text.count(",") + max(text.count("\n"), text.count("\r"))
+    if marks > MOST:
+        raise ValueError(f"must have at most {MOST} lines and commas")
+    return text
 
 
 def _of_json(text: str) -> dict[str, object]:

@@ -10,6 +10,7 @@ from der.utils.checks import shown
 
 COMMENTS = ("#", "%", "//", "!")
 PREAMBLE = 100  # lines among which the first numbers are
+LONGEST = 10_000  # characters of the first line of numbers
 UNIT = re.compile(r"\[[^]]*\]|\([^)]*\)")  # in a head: [mm], (mm)
 DECIMAL_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 
@@ -99,8 +100,8 @@ def _pointed(line: str, separator: str | None) -> str:
 
 
 def _width(line: str) -> int:
-    """Return how many numbers a line has, 0 if there is anything else in it."""
-    return len(_numbers(line, _separator(line)) or [])
+    """Return how many numbers a line has, 0 if there is anything else in it or it has no end."""
+    return len(_numbers(line, _separator(line)) or []) if len(line) <= LONGEST else 0
 
 
 def _are_numbers(line: str, separator: str | None, width: int) -> bool:
@@ -110,9 +111,9 @@ def _are_numbers(line: str, separator: str | None, width: int) -> bool:
 
 def _values(lines: list[str], separator: str | None) -> Array | None:
     """Return the numbers of all lines, None where they are not a table."""
-    ends = lines[0].rstrip().endswith(separator or " ")
+    ends = lines[0].rstrip(" ").endswith(separator or " ")
     rows = (
-        _pointed(line.rstrip().rstrip(separator) if ends else line, separator) for line in lines
+        _pointed(line.rstrip(" ").rstrip(separator) if ends else line, separator) for line in lines
     )
     try:
         return np.loadtxt(rows, delimiter=separator, ndmin=2)

@@ -18,7 +18,7 @@ from numpy.lib import format as npy
 
 from der.utils import checks
 from der.utils.checks import Array
-from der.utils.files import FilePath, write_whole
+from der.utils.files import FilePath, opened, write_whole
 
 LARGEST = 2**28  # bytes of arrays that are read from a smaller file
 
@@ -175,7 +175,7 @@ class Shapes:
         ValueError
             If it is broken, too large, or not such a file.
         """
-        with open(path, "rb") as file:
+        with opened(path) as file:
             try:
                 arrays = _arrays(file)
                 x, frames, places = arrays["x"], arrays["frames"], arrays.get("arc_length")
@@ -233,11 +233,12 @@ def _named(prefix: str, record: Fall | Softest | Internal) -> dict[str, Array]:
     return {f"{prefix}/{name}": np.asarray(value) for name, value in vars(record).items()}
 
 
-_SNAP, _MODES, _INSIDE = (
-    "|".join(entry.name for entry in fields(kind)) for kind in (Fall, Softest, Internal)
-)
+_PARTS = {r"falls/\d{1,6}": Fall, "softest": Softest, "internal": Internal}
 _NAMES = re.compile(
-    rf"x|frames|arc_length|falls/\d{{1,6}}/({_SNAP})|softest/({_MODES})|internal/({_INSIDE})"
+    "|".join(
+        ["x", "frames", "arc_length"]
+        + [f"{part}/{entry.name}" for part, kind in _PARTS.items() for entry in fields(kind)]
+    )
 )
 
 

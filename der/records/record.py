@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import io
 import os
-import pathlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
@@ -30,7 +29,7 @@ from der.records.values import (
     one_of,
 )
 from der.utils.checks import shown
-from der.utils.files import FilePath, Saved, json_entries, json_lines
+from der.utils.files import FilePath, Saved, content, json_entries, json_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -152,11 +151,8 @@ class Record(Checked, Shown, Saved):
             If it is too large, broken or of another kind or schema; the message names the file and
             what is wrong.
         """
-        file = pathlib.Path(path)
         try:
-            if file.stat().st_size > LARGEST:
-                raise ValueError(f"a record has at most {LARGEST} bytes, not {file.stat().st_size}")
-            return cls.from_json(_decoded(file.read_bytes()))
+            return cls.from_json(_decoded(content(path, LARGEST)))
         except ValueError as problem:
             raise ValueError(f"{os.fspath(path)}: {problem}") from problem
 
@@ -213,8 +209,8 @@ class RingRecord(Record):
     scale: ScaleEntry | None = None
 
 
-def _decoded(content: bytes) -> str:
+def _decoded(read: bytes) -> str:
     try:
-        return content.decode()
+        return read.decode()
     except UnicodeDecodeError:
         raise ValueError("no text file") from None

@@ -17,6 +17,36 @@ FORGOTTEN = 3600.0  # s without a change: nobody writes any more
 FilePath: TypeAlias = str | os.PathLike[str]
 
 
+def opened(path: FilePath) -> BinaryIO:
+    """A file to be read; a named pipe that nobody writes to is empty, and not waited for."""
+    at_once: int = getattr(os, "O_NONBLOCK", 0)  # Windows has no such pipes
+
+    def opener(name: str, flags: int) -> int:
+        number = os.open(name, flags | at_once)
+        if at_once:
+            os.set_blocking(number, True)
+        return number
+
+    return open(path, "rb", opener=opener)
+
+
+def content(path: FilePath, most: int) -> bytes:
+    """What is in a file, whatever it says its size is: devices are endless.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it has more than ``most`` bytes.
+    """
+    with opened(path) as file:
+        found = file.read(most + 1)
+    if len(found) > most:
+        raise ValueError(f"must have at most {most} bytes")
+    return found
+
+
 class Saved:
     """A record that writes itself as JSON."""
 

@@ -326,6 +326,30 @@ def test_a_folder_below_a_file_is_refused(run):
     assert err == ["der: --out must be a folder, got 'file/below': Not a directory"]
 
 
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ((*SMALL, "--out", ""), "--out"),
+        ((*SMALL, "--json", ""), "--json"),
+        (("phase", "fig3a", "--out", ""), "--out"),
+        (("figure", "fig2b", "--out", ""), "--out"),
+    ],
+)
+def test_no_name_is_not_the_folder_one_is_in(run, folder, words, name):
+    code, out, err = run(*words)
+    assert (code, out, err) == (2, "", [f"der: {name} must be a file name, got ''"])
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize("target", ["link", "nowhere/x.json"])
+def test_a_link_to_no_place_is_refused_before_the_work(run, target):
+    """To itself, or into a folder that is not there."""
+    File("link").symlink_to(target)
+    code, out, err = run(*SMALL, "--json", "link")
+    assert (code, out, len(err)) == (2, "", 1)
+    assert err[0].startswith("der: --json must be a file in a folder that can be written to, got")
+
+
 def test_what_is_no_regular_file_is_not_replaced_by_one(run, folder):
     """A record is renamed into its place: --json /dev/null would take the device away."""
     os.mkfifo("pipe")

@@ -1,6 +1,7 @@
 """Profiles as strangers write them: any dialect, start, direction, spacing and rounding."""
 
 import io
+import os
 from itertools import product
 
 import numpy as np
@@ -81,6 +82,7 @@ DIALECTS = {
     "lines of Windows": lambda p: saved(p, "x,y", newline="\r\n"),
     "quotes": lambda p: '"x","y"\n' + saved(p),
     "commas at the end": lambda p: saved(p, "x,y").replace("\n", ",\n"),
+    "tabs at the end": lambda p: saved(p, separator="\t").replace("\n", "\t\n"),
     "constant z": lambda p: saved(np.insert(p, 2, 7.25, axis=1), "x,y,z"),
     "constant x": lambda p: saved(np.insert(p, 0, 0.0, axis=1), "r1 r2 r3", " "),
     "tilted": lambda p: saved(np.column_stack([p[:, 0], 0.8 * p[:, 1], 0.6 * p[:, 1]])),
@@ -198,6 +200,39 @@ def test_curvature_of_any_unit_and_start_is_the_ring(tmp_path, form, unit):
     assert difference(ring, "ellipse") < 1e-3
     assert ring.parameters["reference_length"] == pytest.approx(unit, rel=1e-3)
     assert ring.length == pytest.approx(exact.length, rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [64, 3000])
+def test_points_without_order_are_refused(count):
+    """A smooth curve as near to them as their noise may be a point; warnings are errors."""
+    for seed in range(20):
+        with pytest.raises(ValueError, match=r"^(points must|the ring's gap)"):
+            der.profile(points=np.random.default_rng(seed).random((count, 2)))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("\n" * 2**23, r"^file must have at most 6000000 lines and commas, got "),
+        ("1," * 2**22 + "\n" * 2**21, r"^file must have at most 6000000 lines and commas, got "),
+        ("1;" * 2**20, "must have lines of numbers"),
+    ],
+)
+def test_floods_are_refused_before_they_are_read(tmp_path, text, message):
+    file = tmp_path / "p.csv"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        read_profile(str(file))
+
+
+def test_a_pipe_without_a_writer_is_not_waited_for(tmp_path):
+    pipe = tmp_path / "p.csv"
+    mkfifo = getattr(os, "mkfifo", None)
+    if mkfifo is None:
+        pytest.skip("no pipes in folders")
+    mkfifo(pipe)
+    with pytest.raises(ValueError, match="must have lines of numbers"):
+        read_profile(str(pipe))
 
 
 def test_points_that_are_not_in_a_plane_are_refused():

@@ -118,8 +118,16 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path):
     file = tmp_path / "large.json"
     with file.open("wb") as opened:
         opened.truncate(2**29)  # takes no room on the disk
-    with pytest.raises(ValueError, match=r"large\.json: a record has at most"):
+    with pytest.raises(ValueError, match=r"large\.json: must have at most"):
         der.Path.load(file)
+
+
+def test_a_device_without_end_is_not_read_to_its_end():
+    """Its size is said to be 0."""
+    if not pathlib.Path("/dev/zero").exists():
+        pytest.skip("no such device")
+    with pytest.raises(ValueError, match=r"^/dev/zero: must have at most"):
+        der.Path.load("/dev/zero")
 
 
 def test_reading_is_what_imports_cattrs():
