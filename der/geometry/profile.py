@@ -170,6 +170,11 @@ def profile_of_points(points: ArrayLike, twist_axis: str | None = None) -> Profi
     if other is not None:
         fewer = _mirrored(replace(given, curve=other), start, is_even)
         error = max(made.data["curvature_error"], _difference(made.outline, fewer.outline))
+    if error > 1:
+        raise ValueError(
+            f"points must tell the ring's curvature, got points that leave it open by "
+            f"{100 * error:.3g} %; more points, or more digits, are needed"
+        )
     resolution = {"resolution": grid} if grid > 0 else {}
     return replace(made, data=made.data | {"curvature_error": error} | resolution)
 

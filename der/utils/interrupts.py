@@ -52,8 +52,15 @@ def _callers(frame: FrameType | None) -> Iterator[str]:
 
 @contextmanager
 def interrupts_heard() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt while kernels run, for a program that then ends."""
-    with _handled_by(interrupt, allowed=_replaceable()):
+    """Let Ctrl-C raise KeyboardInterrupt while kernels run, for a program that then ends.
+
+    A request to end, as batch systems send it, does the same: what is solved is kept.
+    """
+    ends = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    with (
+        _handled_by(interrupt, allowed=_replaceable()),
+        _handled_by(lambda *_: signal.raise_signal(signal.SIGINT), signal.SIGTERM, allowed=ends),
+    ):
         yield
 
 
@@ -87,17 +94,20 @@ def interrupts_ignored() -> Iterator[None]:
 
 @contextmanager
 def _handled_by(
-    handler: Callable[[int, FrameType | None], None] | signal.Handlers, *, allowed: bool
+    handler: Callable[[int, FrameType | None], object] | signal.Handlers,
+    number: int = signal.SIGINT,
+    *,
+    allowed: bool,
 ) -> Iterator[None]:
-    """Set the handler of Ctrl-C, if that is allowed and in the main thread."""
+    """Set the handler of a signal, if that is allowed and in the main thread."""
     if not allowed or threading.current_thread() is not threading.main_thread():
         yield
         return
-    usual = signal.signal(signal.SIGINT, handler)
+    usual = signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, usual)
+        signal.signal(number, usual)
 
 
 def _replaceable() -> bool:

@@ -664,15 +664,15 @@ def stuck(monkeypatch):
     follow_with(monkeypatch, max_steps=6)
 
 
-@pytest.fixture
-def interrupted(monkeypatch):
-    """The user presses Ctrl-C after the fifth state."""
+@pytest.fixture(params=[signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "end"])
+def interrupted(request, monkeypatch):
+    """The user presses Ctrl-C, or a batch system ends the process, after the fifth state."""
     usual = der.analysis.fold._points
 
     def points(*arguments):
         for k, point in enumerate(usual(*arguments)):
             if k == 5:
-                signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(request.param)
             yield point
 
     monkeypatch.setattr(der.analysis.fold, "_points", points)
