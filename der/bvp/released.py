@@ -14,6 +14,10 @@ squares is the index of the ring without grips. A half-turn of the ring's symmet
 itself or into -w: at the end of a sector w2 is free and w1 = w3 = 0, or the other way round. Each
 class of motions is a problem on the sector; for each rigid motion in it one value is held.
 
+The first class turns the grips, and its other motions are those in the grips. All else relaxed, the
+stiffness against that turning is dM/dgamma. So where no class has a negative square the slope is
+positive; and on the way out of there the first class loses its stiffness with the slope.
+
 On the intervals of the collocation w has the degree of its polynomials, and integrals are its Gauss
 sums: the stationary w are then those of the linearised collocation equations, of the same order.
 The values inside the intervals are eliminated first, which leaves the index as it is: it is that of

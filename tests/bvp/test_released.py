@@ -11,7 +11,7 @@ from shapes import scene
 
 import der
 from der.bvp.collocation import collocation
-from der.bvp.released import index_free, planar, planar_shape, stiffnesses
+from der.bvp.released import classes, index_free, planar, planar_shape, stiffnesses
 from der.bvp.sectors import sector
 from der.bvp.solve import solve_with_points
 
@@ -110,6 +110,29 @@ def test_index_changes_where_the_stiffness_of_its_class_vanishes():
     ring = der.ellipse(0.6)
     at = threshold(ring, 3.5, 3.8)
     assert [index_free(folded(ring, at + d)) for d in (-1e-6, 1e-6)] == [1, 0]
+
+
+@pytest.mark.parametrize("part", [QUARTER, HALF])
+@pytest.mark.parametrize("h_over_t", [2.0, 3.2833, 3.2835, 3.5])
+def test_the_first_class_has_the_slope_for_its_stiffness(h_over_t, part):
+    """Against turning the grips, all else relaxed; below h/t = 3.2834 its index has that turning.
+
+    A quarter's energy has the derivative M by gamma, the turning of its grip; a half's by 2 gamma,
+    that of its one grip against the other. The matrix is that of the second derivatives, twice.
+    """
+    ring = der.rectangle(0.6, 0.3)
+    state, slope = folded(ring, h_over_t, part=part), path(ring, h_over_t).at_pi.slope
+    first, *others = classes(state)
+    turning = len(state.h) - (part == HALF)  # w2 at the last grip; a half's first one is held
+    left = np.delete(np.arange(len(first.matrix)), turning)
+    held = first.matrix[np.ix_(left, left)]
+    (sign, size), (own, reference) = map(np.linalg.slogdet, (first.matrix, held))
+    stiffness = sign * own * math.exp(size - reference)
+    assert stiffness == pytest.approx((1 if part == HALF else 2) * slope, abs=1e-6)
+    assert first.index == (slope < 0.0)
+    if h_over_t > 3.0:  # the slope's threshold is the only one nearby
+        assert [one.index for one in others] == [0] * len(others)
+        assert index_free(state) == (slope < 0.0)
 
 
 def test_index_of_random_rings_is_that_of_the_rod():

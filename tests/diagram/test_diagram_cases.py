@@ -101,6 +101,13 @@ def test_a_ring_that_is_stable_at_fixed_moment_and_opens_has_a_label_of_its_own(
     assert [row.stays_folded for row in rows] == [False, False, False, True]
 
 
+def test_a_ring_that_opens_by_turning_its_grips_alone_has_no_label_between():
+    """Rectangle 0.6, 0.3: unstable up to h/t = 3.283444 at fixed moment and when released."""
+    case = Case("rectangle", 1.0, b_over_a=0.6, r_over_a=0.3)
+    rows = [solve_case(replace(case, h_over_t=h)) for h in (3.28344, 3.28345)]
+    assert [row.label for row in rows] == [LABELS[1], LABELS[5]]
+
+
 def test_a_row_with_labels_of_another_version_is_not_read():
     """So that its case is solved again."""
     entries = solve_case(CIRCLE).to_json() | {"label": "stable, snap-through"}
