@@ -104,7 +104,7 @@ def _stable(row: Row) -> bool | None:
 
 
 def _stays_folded(row: Row) -> bool | None:
-    return row.stays_folded if row.ok and row.stable else None
+    return row.stays_folded if row.ok and row.foldable else None
 
 
 def _snaps_back(row: Row) -> bool | None:

@@ -13,6 +13,7 @@ import pytest
 
 from der.diagram.cases import LABELS, Row, solve_case
 from der.diagram.curves.boundaries import _Search as Search
+from der.diagram.curves.boundaries import boundaries
 from der.diagram.curves.conditions import KINDS, NotFound, asymptotic, fresh, numbers
 from der.diagram.curves.corners import Line, Met, mark_corners
 from der.diagram.curves.corners import _has as reaches
@@ -154,6 +155,23 @@ def test_exchange_of_paths_has_errors_like_the_others(about_y):
         math.pi, abs=1e-9
     )
     assert min(point.gamma for point in points) == pytest.approx(2.508011, abs=1e-5)
+
+
+def test_rings_stay_folded_from_the_slope_on_where_no_other_motion_is_softer():
+    """Triangles of 120 degrees: up to r/a = 0.126047 another class bounds, and beyond the slope."""
+    of = family("fig8c", ranges={"r_over_a": (0.12, 0.1339), "h_over_t": (3.4, 4.0)}, finest=4)
+    grid = [(i / 4, j / 4) for i in range(5) for j in range(5)]
+    found, corners = boundaries(of, [solve_case(of.case("x", u)) for u in grid])
+    (corner,) = corners
+    assert corner.kinds == ("stability", "stays folded")
+    at = corner.point.case
+    assert (at.r_over_a, at.h_over_t) == pytest.approx((0.126047341, 3.575549622), abs=1e-7)
+    assert sorted(c.kind for c in found) == ["stability", "stays folded", "stays folded"]
+    slope, own, shared = ([point.case for point in curve.points] for curve in found)
+    assert at in (own[0], own[-1])
+    assert min(case.r_over_a for case in own) == 0.12
+    assert set(shared) == {case for case in slope if case.r_over_a >= at.r_over_a}
+    assert len(shared) > 3
 
 
 @pytest.mark.parametrize(("beside", "foldable"), [(1e-4, True), (-1e-4, False)])

@@ -49,6 +49,7 @@ ROUNDS, ROUND = 3, 12  # searches around loose ends, and places of each
 BISECTED = 1e-6  # of the diagram's side
 REACH = 3.0  # gaps of the scan within which a crossing must find its curve
 EXCHANGE = "exchange"
+STABILITY, STAYS = "stability", "stays folded"
 INFINITE = "infinite slope"
 
 
@@ -112,6 +113,7 @@ class _Search:
         kept, met = self._continued(lines, kept, met)
         left = [narrow for narrow in left if not _explained(narrow, kept)]
         curves = [self._curve(line) for line in kept]
+        curves += [replace(self._curve(line), kind=STAYS) for line in self._released(kept)]
         points: dict[str, list[BoundaryPoint]] = defaultdict(list)
         for narrow in self.cases.bisected(left, BISECTED):
             points[narrow.kind].append(self.cases.between(narrow))
@@ -238,8 +240,8 @@ class _Search:
         asked = [(n, k) for n, line in enumerate(lines) for k in asked_beside(line)]
         holds: list[list[bool | None]] = [[None] * len(line.points) for line in lines]
         for _ in range(SHARPER):
-            for (n, k), held in zip(asked, self._hold(lines, asked), strict=True):
-                holds[n][k] = held
+            for (n, k), rows in zip(asked, self._sides(lines, asked), strict=True):
+                holds[n][k] = None if rows is None else _bounds(lines[n].kind, *rows)
             if not (asked := self._sharpened(lines, holds)):
                 break
         pieces: list[Line] = []
@@ -254,12 +256,28 @@ class _Search:
         met = [replace(m, kinds=tuple(k for k in m.kinds if (m, k) in there)) for m in met]
         return kept, [one for one in met if len(one.kinds) > 1]
 
-    def _hold(self, lines: list[Line], asked: list[tuple[int, int]]) -> Iterator[bool | None]:
-        """Whether the modes on the two sides of points differ; None where that is not known."""
+    def _released(self, kept: list[Line]) -> Iterator[Line]:
+        """The parts of curves of stability that bound rings that stay folded when released, too.
+
+        What they lose there is the stiffness of the class that turns the grips.
+        """
+        for n, line in enumerate(kept):
+            asked = asked_beside(line) if line.kind == STABILITY else []
+            holds: list[bool | None] = [None] * len(line.points)
+            sides = self._sides(kept, [(n, k) for k in asked])
+            for k, rows in zip(asked, sides, strict=True):
+                if rows is not None:
+                    holds[k] = rows[0].stays_folded != rows[1].stays_folded
+            yield from pieces_of(line, holds)
+
+    def _sides(
+        self, lines: list[Line], asked: list[tuple[int, int]]
+    ) -> Iterator[tuple[Row, Row] | None]:
+        """The cases on the two sides of points; None where those do not tell."""
         sides = [beside(lines[n], k, lines) for n, k in asked]
         rows = iter(self.cases.solve([self.cases.case(u) for places in sides for u in places]))
-        for (n, _), places in zip(asked, sides, strict=True):
-            yield _bounds(lines[n].kind, next(rows), next(rows)) if places else None
+        for places in sides:
+            yield (next(rows), next(rows)) if places else None
 
     def _sharpened(
         self, lines: list[Line], holds: list[list[bool | None]]

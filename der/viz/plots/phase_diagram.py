@@ -37,6 +37,7 @@ BOUNDARIES: dict[str, tuple[str, Any, float]] = {  # name, line style and width 
     "infinite slope": ("foldability (infinite slope at $\\pi$)", (0, (7, 1.2)), 1.5),
     "exchange": ("branch exchange", (0, (8, 1.5, 1, 1.5)), 1.5),
 }
+GAPS = {"stays folded": "#FFFFFF"}  # of dashes: it hides the curve of stability where they are one
 SYMBOLS = {"circle": "o", "ellipse": "s", "rectangle": "s", "triangle": "^"}
 PARAMETERS = {
     "b_over_a": "$b/a$",
@@ -147,7 +148,8 @@ def _line(kind: str) -> tuple[str, dict[str, Any]]:
     """Name and look of a boundary."""
     own = kind.removesuffix(" (scan)")
     name, dashes, width = BOUNDARIES.get(own, (kind, "-.", 1.0))
-    return name if own == kind else kind, {"color": INK, "linestyle": dashes, "linewidth": width}
+    look = {"color": INK, "linestyle": dashes, "linewidth": width, "gapcolor": GAPS.get(own)}
+    return name if own == kind else kind, look
 
 
 def _label(axes: Axes, diagram: DiagramPicture, *, small: bool) -> None:
