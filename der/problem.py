@@ -28,6 +28,7 @@ from der.errors import Reason
 Array: TypeAlias = NDArray[np.float64]
 Increment: TypeAlias = Array  # (m,) unknowns, multipliers, and the parameter last
 Indices: TypeAlias = tuple[int | None, ...]  # one a symmetry class, multiplicities not yet applied
+Softest: TypeAlias = tuple[tuple[float, ...], ...]  # for each class, stiffnesses of soft modes
 
 S = TypeVar("S")  # a configuration: frames, angles, numbers, ...
 A = TypeVar("A", bound="Solution[Any]")
@@ -138,8 +139,11 @@ class Stability(System[S], Protocol[S]):
     def soft(self) -> float:
         """Stiffness of a mode below which two changes of sign are looked for within one step."""
 
-    def indices(self, state: S, symmetry: str | None = None) -> tuple[Indices, tuple[float, ...]]:
-        """Return certified index and lowest stiffness of every class, or of one."""
+    def indices(self, state: S, symmetry: str | None = None) -> tuple[Indices, Softest]:
+        """Return certified index and lowest stiffness of every class, or of one.
+
+        A class may give several stiffnesses, one for each further symmetry of its modes.
+        """
 
     def count(self, state: S, symmetry: str) -> int:
         """Return the negative eigenvalues of one class as the factors show them, not certified."""
@@ -194,7 +198,7 @@ class Point(Generic[A]):
     solution: A
     kind: str = ""  # "", "fold", "limit", "branch", or the kind of a further event
     index: Indices | None = None
-    stiffness: tuple[float, ...] = ()  # of the softest mode of each class, where index is known
+    stiffness: Softest = ()  # where index is known
     sides: tuple[Indices, Indices] | None = None  # index before and after a singular solution
     details: Mapping[str, object] = field(default_factory=dict)
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from der.errors import Reason
-from der.problem import PARAMETER, PLANE, Array, Increment, Indices, Solution
+from der.problem import PARAMETER, PLANE, Array, Increment, Indices, Softest, Solution
 
 _UNCERTAIN = 1e-12  # of the largest eigenvalue: smaller ones have no certain sign
 _ROUNDING = 1e-15  # of the terms of a residual
@@ -181,9 +181,7 @@ class Potential:
         hess = self.terms(state.x, state.p).hess[np.ix_(which, which)]
         return np.linalg.eigvalsh(scale[:, None] * hess * scale)
 
-    def indices(
-        self, state: Configuration, symmetry: str | None = None
-    ) -> tuple[Indices, tuple[float, ...]]:
+    def indices(self, state: Configuration, symmetry: str | None = None) -> tuple[Indices, Softest]:
         """Return index and lowest stiffness of every class, or of one."""
         counts: list[int | None] = []
         softest = []
@@ -192,7 +190,7 @@ class Potential:
             softest.append(float(values[np.argmin(np.abs(values))]))
             certain = abs(softest[-1]) > _UNCERTAIN * max(1.0, float(np.abs(values).max()))
             counts.append(self.count(state, name) if certain else None)
-        return tuple(counts), tuple(softest)
+        return tuple(counts), tuple((one,) for one in softest)
 
     def count(self, state: Configuration, symmetry: str) -> int:
         """Return the negative eigenvalues of one class."""

@@ -1,8 +1,9 @@
-"""The benchmark, the stress test and the survey of error bars, from a clone.
+"""The benchmark, the stress test and two surveys over random rings, from a clone.
 
     python -m validation benchmark [--quick] [--only PARTS] [--json F] [--out DIR]
     python -m validation stress [--quick | --long] [--workers N] [--seed N] [--json F]
     python -m validation error-bars [--count N] [--seed N] [--edges N,...] [--json F]
+    python -m validation sectors [--count N] [--seed N] [--edges N,...] [--json F]
 
 `der bench` and `der stress` do the same in the folder of a clone.
 """
@@ -20,7 +21,7 @@ from der.cli.files import check_named, check_writable, made_folder
 from der.cli.output import show
 from der.cli.parsing import add_command, application, file_option, numbers, option, options_named
 
-app = application("The evidence: benchmark, stress test and survey of error bars.")
+app = application("The evidence: benchmark, stress test and surveys over random rings.")
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,16 @@ class ErrorBarOptions:
     seed: int = option("Of the rings.", 0)
     edges: str = option("Edges of the rods, commas between.", "64,128")
     json: str | None = file_option("Write everything judged, with the rings of what is outside.")
+
+
+@dataclass(frozen=True)
+class SectorOptions:
+    """Which rings are compared."""
+
+    count: int = option("Random circles.", 300)
+    seed: int = option("Of the rings.", 0)
+    edges: str = option("Edges of the rods, commas between.", "64,128")
+    json: str | None = file_option("Write every change of the index that was found.")
 
 
 def benchmark(wanted: BenchOptions) -> int:
@@ -79,6 +90,20 @@ def error_bars(wanted: ErrorBarOptions) -> int:
     return 130 if found.interrupted else 0
 
 
+def sectors(wanted: SectorOptions) -> int:
+    """Compare the index and its changes between sectors, meshes and steps, over random circles."""
+    with options_named():
+        edges = [int(n) for n in numbers("edges", wanted.edges) or ()]
+        file = _writable(wanted.json)
+    from validation.sectors import saved, survey
+
+    found = survey(wanted.count, wanted.seed, edges)
+    if file is not None:
+        file.write_text(saved(found))
+    show(str(found))
+    return 130 if found.interrupted else 0
+
+
 def _writable(json: str | None) -> File | None:
     """The file of --json, after making sure that it can be written."""
     if json is None:
@@ -87,7 +112,7 @@ def _writable(json: str | None) -> File | None:
     return File(json)
 
 
-for _command in (benchmark, stress, error_bars):
+for _command in (benchmark, stress, error_bars, sectors):
     add_command(app, _command)
 
 if __name__ == "__main__":

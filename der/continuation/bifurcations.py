@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 
 from der.continuation.roots import ROOT
 from der.continuation.step import SAME, Step
-from der.problem import Solution, Stability
+from der.problem import Indices, Solution, Stability
 
 _CHORD = 2e-7  # of s: a residual of 1e-12 displaces its ends by 1e-5, its sagitta is below 1e-12
 _NEXT = 1e-6  # of s: distance at which dparameter/dconjugate is computed; next to a branch point
@@ -48,10 +48,15 @@ class Counting:
     step: Step[Any]
     system: Stability[Any]
     symmetry: str
+    part: int = 0  # which of the stiffnesses of the class is looked at
 
     def at(self, s: float) -> Place:
         """Place ``s`` with the count there."""
         return s, self.system.count(self.step.at(s).state, self.symmetry)
+
+    def _looked(self, state: Any) -> tuple[Indices, float]:
+        count, (softest,) = self.system.indices(state, self.symmetry)
+        return count, softest[self.part]
 
     def changes(self, low: Place, high: Place) -> list[Change]:
         """Return where the index changes between two places, by bisection."""
@@ -104,7 +109,7 @@ class Counting:
         if u is None:
             return []
         s = low[0] + u * (high[0] - low[0])
-        (count,), (stiff,) = self.system.indices(self.step.at(s).state, self.symmetry)
+        (count,), stiff = self._looked(self.step.at(s).state)
         if count != low[1]:
             return [] if count is None else [(s, count)]
         place = (s, count)
@@ -121,7 +126,7 @@ class Counting:
         for end in sorted((0, 1), key=lambda end: abs(stiffness[end])):  # often one is enough
             inward = _AHEAD if end == 0 else -_AHEAD
             state = self.step.expected((low, high)[end] + inward * (high - low))
-            _, (beside,) = self.system.indices(state, self.symmetry)
+            _, beside = self._looked(state)
             rise = beside - stiffness[end]
             if rise * stiffness[end] >= 0.0:  # it stiffens from this end on
                 return None

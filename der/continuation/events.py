@@ -211,9 +211,11 @@ class _Stability:
                 continue
             places = [low, high]
             if low[1] == high[1] and a.point.stiffness and b.point.stiffness:
-                stiffness = a.point.stiffness[c], b.point.stiffness[c]
-                places[1:1] = counting.between_equals(low, high, stiffness)
-            changes = [one for ends in pairwise(places) for one in counting.changes(*ends)]
+                softest = zip(a.point.stiffness[c], b.point.stiffness[c], strict=True)
+                for part, pair in enumerate(softest):
+                    places += replace(counting, part=part).between_equals(low, high, pair)
+            ends = pairwise(sorted(places))
+            changes = [one for low, high in ends for one in counting.changes(low, high)]
             found += [replace(one, fold=c == 0 and is_fold(self.step, one.s)) for one in changes]
         return found
 

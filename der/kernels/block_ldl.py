@@ -233,6 +233,28 @@ def inertia(factors):
 
 
 @njit(cache=True)
+def solve(factors, x):
+    """Replace ``x`` (n, b, r) by K^-1 x, the border's own entries zero. False: K is singular."""
+    n, b, r = x.shape
+    M = factors.schur.shape[0]
+    y = np.zeros((M, r))
+    solve_band(factors.inverse, factors.lower, x)
+    for j in range(n):
+        for k in range(b):
+            for p in range(M):
+                for c in range(r):
+                    y[p, c] -= factors.border[j, k, p] * x[j, k, c]
+    if not solve_dense(factors.schur.copy(), y):
+        return False
+    for j in range(n):
+        for k in range(b):
+            for c in range(r):
+                for p in range(M):
+                    x[j, k, c] -= factors.lifted[j, k, p] * y[p, c]
+    return True
+
+
+@njit(cache=True)
 def solve_augmented(factors, m, column, column_border, row, row_border, corner, x, y, z):
     """Solve K with one more column and one more, unsymmetric, row, such as an arclength condition.
 

@@ -178,6 +178,11 @@ def gripped_ring(
     angle = 0.5 * (turned - 0.5 * np.pi)  # half the turn about E1 from d3 = E3
     quat = np.stack([np.cos(angle), np.sin(angle), 0.0 * s, 0.0 * s], axis=1)
     supports, classes = {"full": _full, "half": _half, "quarter": _quarter}[name](rod)
+    half_turns = _half_turns(name, len(s), ring.symmetry == "D2")
+    classes = {
+        label: (count, modes._replace(half_turns=half_turns))
+        for label, (count, modes) in classes.items()
+    }
     start = State(quat, np.zeros(len(s)), np.zeros(len(supports.target)), 0.0)
     return GrippedRing(rod, supports, name, COPIES[name], start, classes, s)
 
@@ -187,6 +192,18 @@ Classes = dict[str, tuple[int, SymmetryClass]]
 
 def _class(free: NDArray[np.bool_], weight: Array, *axes: Array) -> SymmetryClass:
     return SymmetryClass(free, np.array([weight] * len(axes)), np.array(axes))
+
+
+def _half_turns(name: str, n: int, twofold: bool) -> NDArray[np.int64]:
+    """Edges (g, n) to which the half-turns lead that map a sector onto itself.
+
+    ``twofold``: whether the one about E2 maps the ring onto itself.
+    """
+    j = np.arange(n)
+    found = [-j % n] if name == "full" else []
+    if twofold and name != "quarter":
+        found.append((n // 2 - j) % n if name == "full" else n - 1 - j)
+    return np.array(found, dtype=np.int64).reshape(-1, n)
 
 
 def _full(rod: Rod) -> tuple[Supports, Classes]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from der.errors import REASONS
 from der.kernels.planar import Array, PlanarRod, correct_planar, negative_planar
-from der.problem import PARAMETER, PLANE, Increment, Indices, LoadedSolution
+from der.problem import PARAMETER, PLANE, Increment, Indices, LoadedSolution, Softest
 
 
 class PlanarConfiguration(NamedTuple):
@@ -138,10 +138,10 @@ class PlanarRodSystem:
 
     def indices(
         self, state: PlanarConfiguration, symmetry: str | None = None
-    ) -> tuple[Indices, tuple[float, ...]]:
+    ) -> tuple[Indices, Softest]:
         """Return the index in the plane; no stiffness is estimated."""
         count = self.count(state, symmetry or "planar")
-        return (count if count >= 0 else None,), (np.inf,)
+        return (count if count >= 0 else None,), ((np.inf,),)
 
     def count(self, state: PlanarConfiguration, symmetry: str) -> int:
         """Return the negative eigenvalues in the plane; below 0: not known."""

@@ -16,9 +16,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from der.kernels.assembly import assemble, lengthened, position_rows, take_out
-from der.kernels.block_ldl import factor, inertia, solve_band, solve_refined
-from der.kernels.dense import solve_dense
+from der.kernels.block_ldl import factor, inertia, solve, solve_refined
 from der.kernels.quaternions import Array
+from der.problem import Indices, Softest
 from der.rod.rod import Rod, State
 from der.rod.supports import Supports, check_cut
 
@@ -36,6 +36,8 @@ class SymmetryClass(NamedTuple):
     free: NDArray[np.bool_]  # (n, b) unknowns that may move
     weight: Array  # (n_c, n) conditions on positions
     axis: Array  # (n_c, 3)
+    # (g, n) edges to which half-turns lead that map the sector onto itself
+    half_turns: NDArray[np.int64] = np.empty((0, 0), dtype=np.int64)
 
 
 class Stack(NamedTuple):
@@ -45,16 +47,39 @@ class Stack(NamedTuple):
     weight: Array  # (k, m, n), of the class with most conditions; the rest are padding
     axis: Array  # (k, m, 3)
     conditions: NDArray[np.int64]  # (k,) how many each class has
+    starts: Array  # (k, p, n, b, 2) of `start_vectors`; p = 0: no stiffness is wanted
 
 
-def stack(classes: Sequence[SymmetryClass]) -> Stack:
-    """Some classes of one sector, one behind another."""
+def stack(classes: Sequence[SymmetryClass], *, looks: bool = False) -> Stack:
+    """Some classes of one sector, one behind another; ``looks``: for their stiffness, too."""
     sizes = [len(modes.axis) for modes in classes]
-    n, m = classes[0].free.shape[0], max(sizes)
+    (n, b), m = classes[0].free.shape, max(sizes)
     weight, axis = np.zeros((len(sizes), m, n)), np.zeros((len(sizes), m, 3))
     for k, (modes, size) in enumerate(zip(classes, sizes, strict=True)):
         weight[k, :size], axis[k, :size] = modes.weight, modes.axis
-    return Stack(np.array([modes.free for modes in classes]), weight, axis, np.array(sizes))
+    starts = (
+        [start_vectors(modes) for modes in classes] if looks else np.empty((len(sizes), 0, n, b, 2))
+    )
+    return Stack(
+        np.array([c.free for c in classes]), weight, axis, np.array(sizes), np.array(starts)
+    )
+
+
+def start_vectors(modes: SymmetryClass) -> Array:
+    """Start vectors (p, n, b, 2) for the softest modes of a class: two for each of p symmetries.
+
+    Inverse iteration keeps the symmetry of its vectors under the half-turns of a state, so a mode
+    does not hide one of another symmetry.
+    """
+    n, b = modes.free.shape
+    # of no symmetry, neither smooth nor of any sign
+    spread = np.arange(1, n * b + 1).reshape(n, b, 1) * np.array(_IRRATIONAL) % 1.0 - 0.5
+    found = [spread * modes.free[:, :, None]]
+    # half-turns that run the curve backwards keep d2 and reverse d1 and d3
+    sense = np.array([-1.0, 1.0, -1.0, 1.0])[:b, None]
+    for onto in modes.half_turns:
+        found = [x + sign * sense * x[onto] for x in found for sign in (1.0, -1.0)]
+    return np.array(found)
 
 
 @njit(cache=True, inline="always")
@@ -69,52 +94,27 @@ def _class_matrix(rod, supports, system, free, weight, axis, quat, stretch, load
 
 
 @njit(cache=True)
-def _stiffness(rod, free, factors):
-    """Estimate of the eigenvalue nearest to zero, by `_ROUNDS` of inverse iteration of two vectors.
+def _stiffness(length, factors, x):
+    """Estimate of the eigenvalue nearest to zero, by `_ROUNDS` of inverse iteration of ``x``.
 
-    The largest compliance among the two in their span; one alone would mix modes of either sign.
+    The largest compliance in the span of two vectors; one alone would mix modes of either sign.
     """
-    n, b = free.shape
-    M = factors.schur.shape[0]
-    start, x = np.zeros((n, b, 2)), np.zeros((n, b, 2))
-    for j in range(n):  # of no symmetry, neither smooth nor of any sign
-        for i in range(b):
-            if free[j, i]:
-                for r in range(2):
-                    x[j, i, r] = ((j * b + i + 1) * _IRRATIONAL[r]) % 1.0 - 0.5
-    y, c = np.empty((M, 2)), np.zeros((2, 2))
+    n, b, _ = x.shape
+    start, c = np.empty((n, b, 2)), np.zeros((2, 2))
     for _ in range(_ROUNDS):
-        _orthonormalise(rod.length, x)
+        _orthonormalise(length, x)
         for j in range(n):
             for i in range(b):
                 for r in range(2):
-                    start[j, i, r] = x[j, i, r]
-                    x[j, i, r] *= rod.length[j]
-        solve_band(factors.inverse, factors.lower, x)
-        A = factors.schur.copy()
-        for p in range(M):
-            for r in range(2):
-                y[p, r] = 0.0
-        for j in range(n):
-            for i in range(b):
-                for p in range(M):
-                    for r in range(2):
-                        y[p, r] -= factors.border[j, i, p] * x[j, i, r]
-        if not solve_dense(A, y):
+                    start[j, i, r] = length[j] * x[j, i, r]
+                    x[j, i, r] = start[j, i, r]
+        if not solve(factors, x):
             return 0.0
-        for j in range(n):
-            for i in range(b):
-                for r in range(2):
-                    if not free[j, i]:
-                        x[j, i, r] = 0.0
-                        continue
-                    for p in range(M):
-                        x[j, i, r] -= factors.lifted[j, i, p] * y[p, r]
     for j in range(n):
         for i in range(b):
             for r in range(2):
                 for q in range(2):
-                    c[q, r] += start[j, i, q] * rod.length[j] * x[j, i, r]
+                    c[q, r] += start[j, i, q] * x[j, i, r]
     middle, half = 0.5 * (c[0, 0] + c[1, 1]), 0.5 * (c[0, 0] - c[1, 1])
     radius = np.sqrt(half * half + c[0, 1] * c[1, 0])
     largest = middle + radius if middle > 0.0 else middle - radius
@@ -147,19 +147,19 @@ def _orthonormalise(length, out_x):
 def _counts(
     cell, length, mass, rest, bending, stretching, measure, closed,
     free, weight, axis, target, turn, turn_axis, pull, reach,
-    frees, weights, axes, conditions, quat, stretch, force, load, shift, looks,
+    frees, weights, axes, conditions, starts, quat, stretch, force, load, shift,
 ):  # fmt: skip
-    """Index, its safety, and (if ``looks``) the stiffness of the softest mode, (k,) each.
+    """Index and its safety (k,), and the stiffness of the softest modes (k, p).
 
     Rod, supports and classes come field by field: numba is slow to take named tuples apart.
     """
     rod = Rod(cell, length, mass, rest, bending, stretching, measure, closed)
     supports = Supports(free, weight, axis, target, turn, turn_axis, pull, reach)
-    classes = Stack(frees, weights, axes, conditions)
-    k = classes.free.shape[0]
+    classes = Stack(frees, weights, axes, conditions, starts)
+    k, p = classes.starts.shape[:2]
     n, b = supports.free.shape
     negative, margin = np.empty(k, dtype=np.int64), np.empty(k)
-    stiffness = np.zeros(k)
+    stiffness = np.zeros((k, p))
     system = assemble(rod, supports, quat, stretch, force, load)
     for c in range(k):
         m = classes.conditions[c]
@@ -176,8 +176,9 @@ def _counts(
         factors = factor(diag, off, border)
         count, margin[c] = inertia(factors)
         negative[c] = count - m
-        if looks and count >= 0:
-            stiffness[c] = _stiffness(rod, own_free, factors)
+        if count >= 0:
+            for r in range(p):
+                stiffness[c, r] = _stiffness(rod.length, factors, classes.starts[c, r].copy())
     return negative, margin, stiffness
 
 
@@ -188,41 +189,43 @@ def index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> i
     either sign: equal counts certify the index, unequal ones make it None.
     """
     check_cut(rod, modes.free)
-    return _certified(rod, supports, stack([modes]), state, looks=False)[0][0]
+    return _certified(rod, supports, stack([modes]), state)[0][0]
 
 
 def indices_and_stiffness(
     rod: Rod, supports: Supports, classes: Stack, state: State
-) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
-    """`index` of each class, and about how stiff its softest mode is [GJ/a^2], with its sign.
+) -> tuple[Indices, Softest]:
+    """`index` of each class, and how stiff its softest modes are [GJ/a^2], with their signs.
 
-    The stiffness is that of `softest_modes`, estimated at little cost: good where it is small.
+    One mode for each symmetry of `start_vectors`. The stiffness is that of `softest_modes`,
+    estimated at little cost: good where it is small.
     """
     for free in classes.free:
         check_cut(rod, free)
-    return _certified(rod, supports, classes, state, looks=True)
+    return _certified(rod, supports, classes, state)
 
 
 def _certified(
-    rod: Rod, supports: Supports, classes: Stack, state: State, *, looks: bool
-) -> tuple[tuple[int | None, ...], tuple[float, ...]]:
-    at = (*rod, *supports, *classes, *state)
-    negative, margin, stiffness = _counts(*at, 0.0, looks)
+    rod: Rod, supports: Supports, classes: Stack, state: State
+) -> tuple[Indices, Softest]:
+    negative, margin, stiffness = _counts(*rod, *supports, *classes, *state, 0.0)
     counts: list[int | None] = negative.tolist()
     safe = margin.tolist()
     doubtful = [c for c in range(len(safe)) if negative[c] < 0 or not safe[c] > _SAFE]
     if doubtful:
         shift = _SHIFT * float(rod.stiffness.max())
-        below, above = (_counts(*at, s, False)[0] for s in (-shift, shift))
+        counting = classes._replace(starts=classes.starts[:, :0])
+        at = (*rod, *supports, *counting, *state)
+        below, above = (_counts(*at, s)[0] for s in (-shift, shift))
         for c in doubtful:
             counts[c] = int(below[c]) if below[c] == above[c] >= 0 else None
-    return tuple(counts), tuple(stiffness.tolist())
+    return tuple(counts), tuple(map(tuple, stiffness.tolist()))
 
 
 def raw_index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> int:
     """The index by the signs of the pivots alone, as a bisection for its changes needs it."""
     at = (*rod, *supports, *stack([modes]), *state)
-    return int(_counts(*at, 0.0, False)[0][0])
+    return int(_counts(*at, 0.0)[0][0])
 
 
 def all_modes(supports: Supports) -> SymmetryClass:

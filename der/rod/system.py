@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from der.kernels.quaternions import Array
-from der.problem import PARAMETER, PLANE, Increment, Indices
+from der.problem import PARAMETER, PLANE, Increment, Indices, Softest
 from der.rod import stability
 from der.rod.equilibrium import DIRECTION_HELD, LOAD_HELD, MOMENT_HELD, Equilibrium, correct
 from der.rod.manifold import difference, product, retract, transport
@@ -64,7 +64,7 @@ class RodSystem:
 
     @cached_property
     def _stack(self) -> Stack:
-        return stack(list(self.modes.values()))
+        return stack(list(self.modes.values()), looks=True)
 
     def increment(self, q: Array | None = None, load: float = 0.0) -> Increment:
         """Return the increment (m,) of rotations and stretches ``q`` (n, b), and of the load."""
@@ -156,11 +156,9 @@ class RodSystem:
         steps = edges(self.rod, state)
         return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
-    def indices(
-        self, state: State, symmetry: str | None = None
-    ) -> tuple[Indices, tuple[float, ...]]:
-        """Return certified index and lowest stiffness [GJ/a^2] of every class, or of one."""
-        own = self._stack if symmetry is None else stack([self.modes[symmetry]])
+    def indices(self, state: State, symmetry: str | None = None) -> tuple[Indices, Softest]:
+        """Return certified index and lowest stiffnesses [GJ/a^2] of every class, or of one."""
+        own = self._stack if symmetry is None else stack([self.modes[symmetry]], looks=True)
         return stability.indices_and_stiffness(self.rod, self.supports, own, state)
 
     def count(self, state: State, symmetry: str) -> int:
