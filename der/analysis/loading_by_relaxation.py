@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from der.analysis.request import EIGHTH, Request
 from der.analysis.secant import CLOSE, ahead, is_work, longer, rested, went_on
@@ -181,29 +182,35 @@ def _with_limits(
 ) -> Iterator[Point[Equilibrium]]:
     """The points together with the limits of the moment, each state one step later."""
     window: list[list[Point[Equilibrium]]] = []  # three places, each with its equal states
-    for one in states:
-        if one.kind == "snap":
-            for same in window[1:]:
-                yield from same
-            window = []
-        if window and abs(one.solution.parameter - window[-1][0].solution.parameter) <= CLOSE:
-            window[-1].append(one)
-        else:
-            window.append([one])
-        if len(window) == 1:
-            yield one
-        if len(window) < 3 or len(window[-1]) > 1:
-            continue
-        a, b, c = (same[0].solution for same in window)
-        turn = list(window[1])
-        if (b.moment - a.moment) * (c.moment - b.moment) < 0.0:
-            turn.append(_turning(loading, a, b, c))
-        yield from sorted(
-            turn, key=lambda v: v.solution.parameter, reverse=c.parameter < b.parameter
-        )
-        window.pop(0)
-    for same in window[1:]:
-        yield from same
+    try:
+        for one in states:
+            if one.kind == "snap":
+                yield from chain(*window[1:])
+                window = []
+            if window and abs(one.solution.parameter - window[-1][0].solution.parameter) <= CLOSE:
+                window[-1].append(one)
+            else:
+                window.append([one])
+            if len(window) == 1:
+                yield one
+            if len(window) == 3 and len(window[-1]) == 1:
+                yield from _with_limit(loading, window)
+                window.pop(0)
+    except ContinuationFailed:
+        yield from chain(*window[1:])  # the states before it are good
+        raise
+    yield from chain(*window[1:])
+
+
+def _with_limit(
+    loading: _Relaxation, window: list[list[Point[Equilibrium]]]
+) -> list[Point[Equilibrium]]:
+    """The middle of three places, in order with the limit of the moment among them."""
+    a, b, c = (same[0].solution for same in window)
+    turn = list(window[1])
+    if (b.moment - a.moment) * (c.moment - b.moment) < 0.0:
+        turn.append(_turning(loading, a, b, c))
+    return sorted(turn, key=lambda v: v.solution.parameter, reverse=c.parameter < b.parameter)
 
 
 def _turning(

@@ -15,7 +15,7 @@ from der.analysis.loading_by_relaxation import RESOLUTION, RISE, _Relaxation, fo
 from der.analysis.request import Request
 from der.analysis.secant import ahead, is_work, longer, rested, went_on
 from der.analysis.snap import Landing
-from der.errors import ContinuationFailed
+from der.errors import ContinuationFailed, Reason
 from der.problem import Point, Statistics
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
@@ -263,6 +263,25 @@ def test_relaxation_does_not_call_a_saddle_its_rest():
     """The flat full ring of natural curvature -1 is at rest by symmetry, with index 2."""
     with pytest.raises(ContinuationFailed, match="in no minimum"):
         next(follow_relaxed(curved(-1.0, "full"), Request(), Statistics()))
+
+
+def test_states_before_a_refused_one_are_handed_out(monkeypatch):
+    """Two states wait for the limit of the moment that may lie between them."""
+    relaxed, reached = _Relaxation.relaxed, []
+
+    def refused(self, start, every=0):
+        if start.load > 3.5 * RISE:
+            raise ContinuationFailed("refused", Reason.NOT_AT_REST)
+        reached.append(start.load)
+        return relaxed(self, start, every)
+
+    monkeypatch.setattr(_Relaxation, "relaxed", refused)
+    ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 32)
+    found = []
+    with pytest.raises(ContinuationFailed, match="refused"):
+        found.extend(follow_relaxed(ring, Request(targets=()), Statistics()))
+    assert len(found) > 3
+    assert loads(tuple(found)) == sorted(set(reached))  # the first step is tried twice
 
 
 # --- dead moment ------------------------------------------------------------------------------
