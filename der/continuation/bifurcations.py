@@ -25,6 +25,7 @@ _AT = 0.1  # of `_NEXT`: largest distance of its root; places have errors of at 
 _AHEAD = 1e-3  # of an interval: distance over which the rate of a stiffness is taken
 _STEEPER = 1.5  # rates are taken to be so much larger than found
 _HALVINGS = 4  # of a step, in the search for two changes of opposite sense
+_SHRINKS = 0.75  # by a bisection: the difference of a stiffness whose root it is, by half
 
 Place: TypeAlias = tuple[float, int | None]  # s, and the index of a class there
 Found: TypeAlias = tuple[float, Solution[Any]]
@@ -101,9 +102,13 @@ class Counting:
 
         Two changes of opposite sense within a step are visible at its ends only by a soft mode
         (``stiffness`` there). While it softens towards a minimum its stiffness lies above the
-        tangents at both ends. Only where these meet beyond zero is the index computed.
+        tangents at both ends. Only where these meet beyond zero is the index computed. Where its
+        signs differ at the ends, two modes change in opposite sense, perhaps close together: the
+        root of the one is bisected as long as the difference shrinks, as it does not at a jump.
         """
-        if not halvings or min(map(abs, stiffness)) > self.system.soft:
+        if not halvings or high[0] - low[0] < SAME * self.step.length:
+            return []
+        if stiffness[0] * stiffness[1] > 0.0 and min(map(abs, stiffness)) > self.system.soft:
             return []
         u = self._meet(low[0], high[0], stiffness)
         if u is None:
@@ -112,10 +117,13 @@ class Counting:
         (count,), stiff = self._looked(self.step.at(s).state)
         if count != low[1]:
             return [] if count is None else [(s, count)]
-        place = (s, count)
-        return self.between_equals(
-            low, place, (stiffness[0], stiff), halvings - 1
-        ) or self.between_equals(place, high, (stiff, stiffness[1]), halvings - 1)
+        halves = (low, (s, count), (stiffness[0], stiff)), ((s, count), high, (stiff, stiffness[1]))
+        for start, end, ends in halves:
+            root = ends[0] * ends[1] < 0.0 and _span(ends) < _SHRINKS * _span(stiffness)
+            found = self.between_equals(start, end, ends, halvings - (not root))
+            if found:
+                return found
+        return []
 
     def _meet(self, low: float, high: float, stiffness: tuple[float, float]) -> float | None:
         """Where between two places, 0 to 1, the tangents of the stiffness meet beyond zero."""
@@ -155,6 +163,10 @@ class Counting:
             *([Change(*folds[0], self.symmetry, rest)] if rest else []),
             *self.changes(near[1], last),
         ]
+
+
+def _span(ends: tuple[float, float]) -> float:
+    return abs(ends[1] - ends[0])
 
 
 def _jump(low: Place, high: Place) -> int:

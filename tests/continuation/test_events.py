@@ -171,6 +171,7 @@ def test_a_pair_of_branch_points_within_one_step(name, n_edges, first, second):
         (-0.9403747811199694, 1.5381643514719432, 128),  # the half and the full ring did
         (-1.02021926768725, 1.6743239305044937, 128),  # -0.70, 0.14, -0.54 within a step
         (-1.1965531979508512, 1.185868096707137, 64),  # ends 4e-7 rad before a fold, softer yet
+        (-1.463461535912722, 1.4773255018060687, 64),  # of two modes, 7e-4 rad apart
     ],
 )
 def test_all_sectors_find_the_same_branch_points(natural_curvature, alpha, n_edges):
