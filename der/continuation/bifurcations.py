@@ -101,16 +101,16 @@ class Counting:
         """A place between two of equal index where the index is different, if there is one.
 
         Two changes of opposite sense within a step are visible at its ends only by a soft mode
-        (``stiffness`` there). While it softens towards a minimum its stiffness lies above the
-        tangents at both ends. Only where these meet beyond zero is the index computed. Where its
-        signs differ at the ends, two modes change in opposite sense, perhaps close together: the
-        root of the one is bisected as long as the difference shrinks, as it does not at a jump.
+        (``stiffness`` there). Only where it softens from the softer end on, and its tangent there,
+        taken steeper, goes through zero, is the index computed in between. Where its signs differ
+        at the ends, two modes change in opposite sense, perhaps close together: the root of the one
+        is bisected as long as the difference shrinks, as it does not at a jump.
         """
         if not halvings or high[0] - low[0] < SAME * self.step.length:
             return []
         if stiffness[0] * stiffness[1] > 0.0 and min(map(abs, stiffness)) > self.system.soft:
             return []
-        u = self._meet(low[0], high[0], stiffness)
+        u = self._reaches(low[0], high[0], stiffness)
         if u is None:
             return []
         s = low[0] + u * (high[0] - low[0])
@@ -125,21 +125,19 @@ class Counting:
                 return found
         return []
 
-    def _meet(self, low: float, high: float, stiffness: tuple[float, float]) -> float | None:
-        """Where between two places, 0 to 1, the tangents of the stiffness meet beyond zero."""
+    def _reaches(self, low: float, high: float, stiffness: tuple[float, float]) -> float | None:
+        """Where between two places, 0 to 1, the tangent at the softer one goes through zero."""
         first, last = stiffness
         if first * last <= 0.0:  # not of one mode
             return 0.5
-        rates = [0.0, 0.0]
-        for end in sorted((0, 1), key=lambda end: abs(stiffness[end])):  # often one is enough
-            inward = _AHEAD if end == 0 else -_AHEAD
-            state = self.step.expected((low, high)[end] + inward * (high - low))
-            _, beside = self._looked(state)
-            rise = beside - stiffness[end]
-            if rise * stiffness[end] >= 0.0:  # it stiffens from this end on
-                return None
-            rates[end] = _STEEPER * rise / inward
-        return meeting(first, rates[0], last, rates[1])
+        end = int(abs(last) < abs(first))
+        inward = -_AHEAD if end else _AHEAD
+        _, beside = self._looked(self.step.expected((low, high)[end] + inward * (high - low)))
+        rise = _STEEPER * (beside - stiffness[end]) / _AHEAD
+        if rise * stiffness[end] >= 0.0 or abs(rise) < abs(stiffness[end]):
+            return None
+        u = min(max(-stiffness[end] / rise, 0.1), 0.9)
+        return 1.0 - u if end else u
 
     def beside_folds(
         self, low: tuple[Place, Solution[Any]], last: Place, folds: Sequence[Found]
@@ -171,16 +169,6 @@ def _span(ends: tuple[float, float]) -> float:
 
 def _jump(low: Place, high: Place) -> int:
     return (high[1] or 0) - (low[1] or 0)
-
-
-def meeting(first: float, rate: float, last: float, last_rate: float) -> float | None:
-    """Where in (0, 1) the tangents to a function at 0 and 1 meet, if that is beyond zero.
-
-    Its values there are of one sign, and become smaller from either end on. A function without a
-    point of inflection does not reach zero otherwise.
-    """
-    u = (last - first - last_rate) / (rate - last_rate)
-    return None if first * (first + u * rate) > 0.0 else min(max(u, 0.1), 0.9)
 
 
 def is_fold(step: Step[Any], s: float) -> bool:

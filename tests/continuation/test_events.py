@@ -11,7 +11,7 @@ from rods import lifted
 import der
 from der.analysis.request import Request
 from der.analysis.self_crossing import _on_its_side
-from der.continuation.bifurcations import is_fold, meeting
+from der.continuation.bifurcations import is_fold
 from der.continuation.events import Mark, located
 from der.continuation.extrema import _bisected
 from der.continuation.step import SAME, between
@@ -116,21 +116,6 @@ def test_both_changes_are_on_the_path():
     assert kinds == [("fold", 0, 1), ("branch", 1, 2), ("branch", 2, 1), ("fold", 1, 0)]
 
 
-@pytest.mark.parametrize(
-    ("ends", "place"),
-    [
-        ((0.04, -0.2, 0.04, 0.2), 0.5),  # -0.06 there
-        ((-0.04, 0.2, -0.04, -0.2), 0.5),  # the same from below
-        ((0.1, -0.4, 0.3, 0.4), 0.25),  # 0 there
-        ((0.04, -0.06, 0.04, 0.06), None),  # 0.01 there
-        ((0.01, -1.0, 0.98, 1.0), 0.1),  # all but at an end
-    ],
-)
-def test_tangents_that_meet_beyond_zero(ends, place):
-    """The lower bound of a stiffness that softens from both ends of a step on."""
-    assert meeting(*ends) == (None if place is None else pytest.approx(place, abs=1e-12))
-
-
 @functools.cache
 def of_curved(natural_curvature: float, alpha: float, name: str, n_edges: int) -> tuple:
     """Branch points of a circle of another natural curvature, alpha = beta: class, gamma, index."""
@@ -162,6 +147,18 @@ def test_a_pair_of_branch_points_within_one_step(name, n_edges, first, second):
     assert found[k][0] == pytest.approx(first, abs=1e-5)
     assert found[k + 1][0] == pytest.approx(second, abs=1e-5)
     assert found[k + 1][1:] == (7, 8)
+
+
+@pytest.mark.parametrize("name", ["quarter", "half", "full"])
+def test_a_pair_whose_mode_softens_late(name):
+    """Stiffness -1.35, 0, 0, -0.27 in a step: the tangent at its start stays far from zero.
+
+    Truth: steps a sixth and a thirtieth as long.
+    """
+    found = of_curved(-2.9774933970369535, 1.0235429748055407, name, 64)
+    k = next(k for k, one in enumerate(found) if one[1:] == (4, 3))
+    assert [one[1:] for one in found[k : k + 2]] == [(4, 3), (3, 4)]
+    assert [one[0] for one in found[k : k + 2]] == pytest.approx([1.2132843, 1.2142055], abs=1e-7)
 
 
 @pytest.mark.parametrize(
