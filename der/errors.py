@@ -32,6 +32,10 @@ class Reason(Enum):
         "gamma has left -4 pi to 4 pi, and the ring has not folded at pi; "
         "a larger gamma_max goes on"
     )
+    FOLD_NEAR_PI = (
+        "a fold lies within its error of pi, and which state arrives there first depends on the"
+        " mesh; use more edges"
+    )
     INTERRUPTED = "stopped by the user"
 
     @property

@@ -14,13 +14,14 @@ from itertools import accumulate
 
 import numpy as np
 
+from der.analysis.extrapolation.arrival import first_arrival, fold_near_pi
 from der.analysis.extrapolation.curve import Family, Place, placed
 from der.analysis.extrapolation.folds import all_asked, arc_lengths
 from der.analysis.extrapolation.located import located, marked
 from der.analysis.extrapolation.remaining_error import Corrections, scales_of
 from der.analysis.path_record import COLUMNS, columns
 from der.analysis.request import EIGHTH, LOOSE_TURN, Request
-from der.errors import ContinuationFailed
+from der.errors import ContinuationFailed, Reason
 from der.kernels.quaternions import Array
 from der.problem import Point
 from der.records.path import AtPi, Mode
@@ -40,9 +41,12 @@ class ErrorBars:
     raw: dict[str, list[float]]  # the same on N edges
     error: dict[str, object]  # the record's entry
     slope: float | None = None  # dM/dgamma at the first arrival at pi, GJ/a; None: no such state
+    note: Reason | None = None  # what a reader should know
 
     def at_pi(self, at_pi: AtPi | None, mode: Mode | None) -> dict[str, AtPi | Mode | None]:
         """Return the entries of the record at pi, with the extrapolated values."""
+        if self.note is Reason.FOLD_NEAR_PI:
+            return {"at_pi": None, "mode": None}
         if at_pi is None or mode is None or self.slope is None:
             return {"at_pi": at_pi, "mode": mode}
         k = self.values["gamma"].tolist().index(math.pi)
@@ -154,20 +158,25 @@ def _bars(
     """Values and errors of points at their places on the extrapolated curve."""
     corrections = Corrections.of(places, scales)
     bounds = [corrections.bound(k) for k in range(len(places))]
+    arrival = first_arrival(points)
+    unsure = fold_near_pi(family, points, places, corrections)
+    if unsure and arrival is not None:
+        bounds[arrival] = None
     raw = columns(family.rings[0], points)
     table = np.array(list(raw.values()))
     for k, place in enumerate(places):
         if place is not None:
             table[:, k] = place.values
     values = dict(zip(COLUMNS, table, strict=True))
-    arrived = (k for k, v in enumerate(points) if not v.kind and v.solution.parameter == math.pi)
-    slope, slope_error = corrections.slope(next(arrived, None))
+    slope, slope_error = corrections.slope(None if unsure else arrival)
     error: dict[str, object] = {
         name: [None if b is None else float(b[c]) for b in bounds] for c, name in enumerate(COLUMNS)
     }
-    error |= {"slope_at_pi": slope_error, "how": _how(family.rings, bounds)}
+    note = Reason.FOLD_NEAR_PI if unsure else None
+    how = _how(family.rings, bounds) + (f"; at pi unknown: {note.value}" if note else "")
+    error |= {"slope_at_pi": slope_error, "how": how}
     plain = {name: column.tolist() for name, column in raw.items()}
-    return ErrorBars(tuple(points), values, plain, error, slope)
+    return ErrorBars(tuple(points), values, plain, error, slope, note)
 
 
 def _order(lengths: Array, places: Sequence[Place | None]) -> list[int]:

@@ -87,6 +87,8 @@ def fold(
         found = _Found(scene, ring, points)
         if run.done and scene.error_bars:
             found = run.attempt(partial(found.extrapolated, request)) or found
+            if run.done and found.bars is not None and found.bars.note is not None:
+                run.note(found.bars.note)
         path = found.record(run, statistics)
     return run.answer(path)
 

@@ -199,7 +199,7 @@ def row_of(case: Case, path: Path) -> Row:
     """The row of a path from gamma = 0 to pi, of either solver."""
     mode, at_pi = path.mode, path.at_pi
     if mode is None:
-        return failed(case, "the path has not reached pi")
+        return failed(case, path.message or "the path has not reached pi")
     stable, stays = bool(mode.stable), bool(mode.stable and mode.stable_free)
     label = label_of(mode.foldable, stable + stays, mode.snapping)
     if label == FAILED:

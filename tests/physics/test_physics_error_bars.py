@@ -20,6 +20,7 @@ from der.analysis.error_bars import ErrorBars, _extrapolated
 from der.analysis.request import Request
 from der.bvp.solve import solve_bvp
 from der.problem import Point
+from der.records.text.path import lines
 from der.rod.gripped_ring import gripped_ring
 from der.scene import meshes
 
@@ -316,6 +317,44 @@ def test_a_path_that_turns_back_for_good_ends_at_minus_pi_by_any_number_of_edges
     assert path.gamma[-1] == -math.pi
     assert path.error["gamma"][-1] == 0.0
     assert 0.0 < path.error["moment"][-1] < 0.02 * abs(path.moment).max()
+
+
+NEAR_PI = (  # a fold beside pi, before it on these edges and beyond it in truth, or the reverse
+    (der.rectangle(0.8630318281198617, 0.4337687912247523, "y"), 1.4782651242, 0.0675580981, 64),
+    (der.rectangle(0.6009708987607869, 0.1627304747842525, "y"), 2.4874797927, 0.3082660596, 64),
+    (der.rectangle(0.6009708987607869, 0.1627304747842525, "y"), 2.4874797927, 0.3082660596, 128),
+    (der.rectangle(0.684787483894391, 0.5332631435603162, "x"), 1.1452, 0.0587, 128),
+)
+
+
+@pytest.mark.parametrize(("ring", "h_over_t", "nu", "n_edges"), NEAR_PI)
+def test_first_arrival_at_pi_is_unknown_where_a_fold_lies_within_its_error_of_pi(
+    ring, h_over_t, nu, n_edges
+):
+    """The first three folded, M(pi) = 0, and the last did not; the converse is true of each.
+
+    The boundary-value problem: M(pi) = 2.43467 and 3.05705, and the last folds.
+    """
+    section = der.rectangular_section(h_over_t, nu)
+    scene = der.Scene(ring, section, n_edges=n_edges, error_bars=True, stability=False)
+    path = der.fold(scene)
+    k = path.gamma.tolist().index(math.pi)
+    assert (path.at_pi, path.mode, path.error["slope_at_pi"]) == (None, None, None)
+    assert [path.error[name][k] for name in COLUMNS] == [None] * 3
+    assert path.reason == "fold_near_pi"
+    assert "fold lies within its error of pi" in path.error["how"]
+    assert lines(path)[1] == path.message
+
+
+def test_first_arrival_at_pi_is_known_again_on_enough_edges():
+    """0.0084 rad between pi and the fold; M(pi) of the boundary-value problem."""
+    ring, h_over_t, nu, _ = NEAR_PI[1]
+    section = der.rectangular_section(h_over_t, nu)
+    scene = der.Scene(ring, section, n_edges=256, error_bars=True, stability=False)
+    path = der.fold(scene)
+    assert path.mode is not None
+    assert not path.mode.foldable
+    assert abs(path.at_pi.moment - 3.0570458015918347) < path.error["moment"][-1]
 
 
 @pytest.mark.parametrize(

@@ -80,10 +80,10 @@ class Corrections:
             # it has no neighbours: its last correction counts as large as along the path
             bound: Array = np.maximum(last, self.ratio * first) + self.left * first
             return bound + place.unsure + floor
-        return self._of(k, place.spread, alone=bool(self.exact[k])) + floor
+        return self.errors(k, place.spread, alone=bool(self.exact[k])) + floor
 
-    def _of(self, k: int, spread: Array, *, alone: bool) -> Array:
-        """Errors of values whose ``spread`` (m, 6) by corrections at a place is known.
+    def errors(self, k: int, spread: Array, *, alone: bool) -> Array:
+        """Return errors of values whose ``spread`` (m, 6) by corrections at a place is known.
 
         The last correction may pass through zero where the error does not: the largest of a state
         and its two neighbours counts, unless the state stands ``alone``.
@@ -112,5 +112,5 @@ class Corrections:
         spread[0, GAMMA] = (slope * bend[GAMMA] - bend[MOMENT]) / gamma_rate**2
         spread[0, RATE + GAMMA], spread[0, RATE + MOMENT] = -slope / gamma_rate, 1.0 / gamma_rate
         spread[1, RATE + GAMMA] = 1.0 / gamma_rate
-        error, share = self._of(k, spread, alone=False).tolist()
+        error, share = self.errors(k, spread, alone=False).tolist()
         return slope, error / (1.0 - share) if share < 1.0 else None

@@ -22,7 +22,7 @@ def lines(path: Path) -> list[str]:
     found = [title(path)]
     if path.mode is not None:
         found.append(mode_text(path.mode))
-    elif path.status == "done" and path.at_pi is None and len(path):
+    elif path.status == "done" and not path.reason and path.at_pi is None and len(path):
         found.append(f"ends at gamma = {path.gamma[-1]:.6g}, before pi")
     if path.message:
         found.append(path.message if path.status == "done" else f"{path.status}: {path.message}")
