@@ -13,7 +13,7 @@ from der.analysis.error_bars import ErrorBars, error_bars
 from der.analysis.extrapolation import located
 from der.analysis.extrapolation.curve import GAMMA, Family, Goal, Matched, _found, placed
 from der.analysis.request import Request
-from der.continuation.richardson import romberg
+from der.continuation.richardson import limit, romberg
 from der.problem import Point
 from der.records.text.path import lines
 from der.rod.equilibrium import Equilibrium
@@ -68,6 +68,21 @@ def test_romberg_takes_out_second_and_fourth_order():
     h = np.array([0.1, 0.2, 0.4])
     plain, once, twice = romberg(1.0 + 2.0 * h**2 + 3.0 * h**4)
     assert [plain, once, twice] == pytest.approx([1.0203, 1.0 - 12.0e-4, 1.0], abs=1e-15)
+
+
+def test_error_holds_what_is_left_of_a_geometric_series():
+    """Coefficients of h^2, h^4, h^6 in a ratio of 1/20; and others whose last correction vanishes.
+
+    By hand: 64 times the last coefficient is left, 1.6e-4 and 1.28e-4.
+    """
+    h2 = np.array([1.0, 4.0, 16.0])
+    one = 1.0 + 1e-3 * h2 + 5e-5 * h2**2 + 2.5e-6 * h2**3
+    other = 1.0 + 2e-3 * h2 - 4.2e-5 * h2**2 + 2e-6 * h2**3
+    values, errors = limit(np.column_stack([one, other]))
+    assert values - 1.0 == pytest.approx([1.6e-4, 1.28e-4], abs=1e-15)
+    assert np.ptp(romberg(other)[1:]) < 1e-15
+    assert np.all(errors > values - 1.0)
+    assert np.all(errors < 2e-3)
 
 
 @pytest.mark.parametrize("column", ["gamma", "moment", "energy"])

@@ -13,7 +13,7 @@ The index is that in the plane; for modes in space see `multistability.states`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -211,19 +211,25 @@ def _described(scene: Scene, mesh: PlanarRing, one: Found) -> PlanarState:
         if at is not None:
             levels.append((coarse, at))
     alpha = scene.section.alpha
-    energy, energy_error = _extrapolated([alpha * at.energy for _, at in levels])
-    force, _ = _extrapolated([alpha * float(np.hypot(*at.force)) for _, at in levels])
-    packing, packing_error = None, None
+    values = {
+        "energy": [alpha * at.energy for _, at in levels],
+        "force": [alpha * float(np.hypot(*at.force)) for _, at in levels],
+    }
+    inexact = 0.0
     if one.turning == FOLDED:
         from der.analysis.planar.area import packing_ratio  # which takes long to load
 
         ratios = [packing_ratio(level, at.phi, one.turning) for level, at in levels]
-        packing, packing_error = _extrapolated([value for value, _ in ratios])
-        if packing_error is not None:
-            packing_error += max(error for _, error in ratios)
-    energies, packings = (energy, energy_error), (packing, packing_error)
-    index, force, residual = _index(mesh, one), max(force, 0.0), alpha * one.at.residual
-    return PlanarState("", one.turning, *energies, *index, force, *packings, residual)
+        values["packing"] = [value for value, _ in ratios]
+        inexact = max(error for _, error in ratios)
+    sure = _extrapolated(values)
+    packing, packing_error = sure.get("packing", (None, None))
+    if packing_error is not None:
+        packing_error += inexact
+    index, force, residual = _index(mesh, one), max(sure["force"][0], 0.0), alpha * one.at.residual
+    return PlanarState(
+        "", one.turning, *sure["energy"], *index, force, packing, packing_error, residual
+    )
 
 
 def _on_coarser(
@@ -238,11 +244,13 @@ def _on_coarser(
     return at if at.converged else None
 
 
-def _extrapolated(levels: list[float]) -> tuple[float, float | None]:
-    """Extrapolated value and error, if all three meshes have a value."""
-    if len(levels) < 3:
-        return levels[0], None
-    return limit(*levels)
+def _extrapolated(levels: Mapping[str, list[float]]) -> dict[str, tuple[float, float | None]]:
+    """Extrapolated values and errors, if all three meshes have a value."""
+    table = np.array(list(levels.values())).T
+    if len(table) < 3:
+        return {name: (values[0], None) for name, values in levels.items()}
+    values, errors = (column.tolist() for column in limit(table))
+    return dict(zip(levels, zip(values, errors, strict=True), strict=True))
 
 
 def _index(mesh: PlanarRing, one: Found) -> tuple[int | None, int]:

@@ -146,15 +146,18 @@ def _extrapolated(
     levels = [_Track.of(mesh, scene) for mesh in coarser(scene)]
     special = [k for k, one in enumerate(points) if one.kind]
     others = [_special(level, points, goal) for level in levels] if special else []
+    known = []
     for k, one in enumerate(points if levels else ()):
         if one.kind:
             same = [other[special.index(k)] for other in others if other]
         else:
             same = [found for level in levels for found in _again(level, track, one.solution)]
-        if len(same) < len(levels):
-            continue
-        for c in range(3):
-            values[k, c], errors[k, c] = limit(values[k, c], same[0][c], same[1][c])
+        if len(same) == len(levels):
+            known.append((k, [values[k], *same]))
+    if known:  # in one call: a correction that vanishes at one state does not at all of them
+        rows, tables = zip(*known, strict=True)
+        table = np.array(tables).swapaxes(0, 1).reshape(len(levels) + 1, -1)
+        values[list(rows)], errors[list(rows)] = (v.reshape(-1, 3) for v in limit(table))
     return values, errors
 
 
