@@ -17,7 +17,7 @@ import numpy as np
 from der.analysis.extrapolation.arrival import first_arrival, fold_near_pi
 from der.analysis.extrapolation.curve import Family, Place, placed
 from der.analysis.extrapolation.folds import all_asked, arc_lengths
-from der.analysis.extrapolation.located import located, marked
+from der.analysis.extrapolation.located import located, marked, merged
 from der.analysis.extrapolation.remaining_error import Corrections, scales_of
 from der.analysis.path_record import COLUMNS, columns
 from der.analysis.request import EIGHTH, LOOSE_TURN, Request
@@ -99,7 +99,8 @@ def _extrapolated(
     ]
     points = [marked(family, *one) for one in zip(points, places, strict=True)]
     order = _order(arc_lengths(rings[0], points), places)
-    return _bars(family, _certain(points, order), [places[k] for k in order], scales)
+    points, places = merged(_certain(points, order), [places[k] for k in order])
+    return _bars(family, points, places, scales)
 
 
 def _asked(request: Request, points: Sequence[Point[Equilibrium]]) -> set[float]:

@@ -26,7 +26,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from der.geometry.mesh import kink_offsets, natural_turning, sites
+from der.geometry.mesh import CLOSE, kink_offsets, natural_turning, sites
 from der.geometry.ring import Ring
 from der.geometry.section import Section
 from der.kernels.linking import link, unfold, unfold_lengths, vertices
@@ -51,6 +51,7 @@ class GrippedRing(RodSystem):
     start: State  # the flat ring, gamma = 0
     symmetry: Mapping[str, tuple[int, SymmetryClass]]  # label -> (multiplicity, modes)
     arc_length: Array  # (n,) of the frames along the ring
+    breaks: Array  # jumps of the curvature, as fractions of the ring's edges
     parameter_name: str = field(default="gamma", kw_only=True)
 
     @cached_property
@@ -184,7 +185,23 @@ def gripped_ring(
         for label, (count, modes) in classes.items()
     }
     start = State(quat, np.zeros(len(s)), np.zeros(len(supports.target)), 0.0)
-    return GrippedRing(rod, supports, name, COPIES[name], start, classes, s)
+    return GrippedRing(
+        rod, supports, name, COPIES[name], start, classes, s, _breaks(ring, n_edges, finest)
+    )
+
+
+def _breaks(ring: Ring, n_edges: int, finest: int | None) -> Array:
+    """Edges where the curvature jumps, over the number of edges.
+
+    At the grips, where the moment about E3 jumps by 2 M, and with the natural curvature.
+    """
+    if not ring.breaks:
+        return np.array([0.0, 0.5])
+    at = sites(ring, n_edges, "full", finest)[:-1]
+    jumps = np.sort([0.0, 0.5 * ring.length, ring.length, *ring.breaks])
+    k = np.searchsorted(jumps, at, side="right")
+    away = np.minimum(at - jumps[k - 1], jumps[k] - at)
+    return np.flatnonzero(away < CLOSE * ring.length) / n_edges
 
 
 Classes = dict[str, tuple[int, SymmetryClass]]

@@ -428,6 +428,41 @@ def test_self_crossing_is_extrapolated(h_over_t):
             assert bar <= 4e-4 * (64 / n_edges) ** 3
 
 
+@pytest.mark.parametrize(
+    ("ring", "h_over_t", "nu", "gamma", "link"),
+    [
+        (
+            der.rectangle(0.41707692433823307, 0.11425666496089233, "x"),
+            4.935077818195443,
+            0.4424347233644433,
+            [1.9800136179, 2.5055490675],
+            [0, -4, -2],
+        ),
+        (
+            der.rectangle(0.7288164499989656, 0.18231464589981328, "y"),
+            4.4315602581645,
+            0.03428938542051642,
+            [2.1211668975, 2.1562135932],
+            [0, -4, 4, 2],
+        ),
+    ],
+    ids=["passed in two stages", "three"],
+)
+def test_self_crossings_of_a_rounded_rectangle_are_extrapolated(ring, h_over_t, nu, gamma, link):
+    """Those on 512 edges; splines across the jumps of curvature were off by 4 times the errors.
+
+    The polygon of 128 edges crosses itself twice where the first ring does once. The third of the
+    second ring is beside a grip, where 32 edges have two vertices between jumps, and no error.
+    """
+    scene = der.Scene(ring, der.rectangular_section(h_over_t, nu), n_edges=128, error_bars=True)
+    path = der.fold(scene)
+    for one, right in zip(path.contacts, gamma, strict=False):
+        assert abs(one.gamma - right) <= path.error["gamma"][one.position] < 3e-4
+    details = [one.details for one in path.contacts]
+    assert [one["linking_before"] for one in details] == link[:-1]
+    assert [one["linking_after"] for one in details] == link[1:]
+
+
 def test_folded_state_is_at_rest_on_the_extrapolated_curve():
     """M(pi) = 0 on every mesh; coarse states that lay beside their plane made it 8e-7."""
     ring = der.rectangle(0.492560509666063, 0.3179767948350868)

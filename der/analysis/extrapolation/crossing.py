@@ -6,16 +6,19 @@ x(u; s) of a path, quintic splines through the vertices, cross where
 
     x(u; s) = x(v; s),
 
-three equations for the places u and v on both strands, and s on the path.
+three equations for the places u and v on both strands, and s on the path. At grips and
+jumps of the natural curvature the second derivative of x jumps, and may the size of the cells: each
+strand is the spline through the vertices between two of these.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeAlias, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from der.analysis.self_crossing import CONTACT
@@ -27,12 +30,12 @@ from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
 
 Curve: TypeAlias = Callable[..., Array]  # point (3,) at a fraction of the ring, or its derivative
+Piece: TypeAlias = tuple[float, float]  # a part of the ring, its ends as fractions
 
 _SLOPE = 1e-4  # of s: the difference for the rate of the curve along the path
 _FAR = 0.1  # of the ring: a crossing farther from where it was looked for is another one
 _MOST = 20  # steps of Newton's method
 _CLOSE = 1e-9  # of s
-_MORE = 24  # vertices; the end of a quintic spline is felt by a factor of 0.43 at each
 
 
 def strands(ring: GrippedRing, step: Step[State]) -> Array | None:
@@ -58,52 +61,80 @@ def smooth_crossing(
     -----
     Newton's method from the middle of the step, with the rate along the path there.
     """
-    curve = partial(_curve, ring, step, finest, degree)
+    pieces = [_piece(ring.breaks, float(u)) for u in where]
+    apart = partial(_apart, ring, step, finest, pieces, degree)
     start = at = np.append(where, 0.5 * step.length)
-    here, beside = (curve(s) for s in (at[2], at[2] + _SLOPE))
-    rate = (_apart(beside, at) - _apart(here, at)) / _SLOPE
+    here, beside = (apart(s) for s in (at[2], at[2] + _SLOPE))
+    rate = (_between(beside, at) - _between(here, at)) / _SLOPE
     for _ in range(_MOST):
-        columns = np.array([here(at[0], 1), -here(at[1], 1), rate])
-        change = np.linalg.solve(columns.T, _apart(here, at))
+        columns = np.array([here[0](at[0], 1), -here[1](at[1], 1), rate])
+        change = np.linalg.solve(columns.T, _between(here, at))
         at = at - change
         elsewhere = np.abs(at - start)[:2].max() > _FAR
         if elsewhere or not 0.0 < at[2] < step.length:
             return None
         if abs(change[2]) < _CLOSE:
-            return cast(Equilibrium, step.at(float(at[2])))
-        here = curve(at[2])
+            inside = all(map(partial(_inside, 1.0 / ring.n_edges), pieces, at[:2]))
+            return cast(Equilibrium, step.at(float(at[2]))) if inside else None
+        here = apart(at[2])
     return None
 
 
-def _curve(
-    ring: GrippedRing, step: Step[State], finest: Step[State], degree: int, s: float
-) -> Curve:
-    """The smooth curve at ``s``: that of the finest mesh, and the distance of the vertices from it.
+def _apart(
+    ring: GrippedRing,
+    step: Step[State],
+    finest: Step[State],
+    pieces: Sequence[Piece],
+    degree: int,
+    s: float,
+) -> list[Curve]:
+    """Both strands at ``s``: those of the finest mesh, and the distance of the vertices from them.
 
     A quarter of the edges are too few for a spline, but not for that distance, of order h^2.
     """
     x = ring.vertices(step.at(float(s)).state)
     if step is finest:
-        return _through(x, degree)
+        return [_through(x, degree, piece) for piece in pieces]
     alike = finest.expected(s / step.length * finest.length)
-    fine = _through(cast(GrippedRing, finest.system).vertices(alike), degree)
-    away = _through(x - fine(_fractions(len(x))), degree)
+    y = cast(GrippedRing, finest.system).vertices(alike)
+    return [_corrected(x, _through(y, degree, piece), degree, piece) for piece in pieces]
+
+
+def _corrected(x: Array, fine: BSpline, degree: int, piece: Piece) -> Curve:
+    """A strand of the finest mesh, moved to vertices of another."""
+    k, n = _vertices(piece, len(x)), len(x)
+    away = _spline(x[k % n] - fine((k + 0.5) / n), k, n, degree)
     return lambda u, order=0: fine(u, order) + away(u, order)
 
 
-def _fractions(n: int, more: int = 0) -> Array:
-    """Places of ``n`` vertices as fractions of the ring: vertex 0 is half an edge behind a grip."""
-    places: Array = (np.arange(-more, n + more) + 0.5) / n
-    return places
+def _piece(breaks: Array, u: float) -> Piece:
+    """The part of the ring around a fraction of it in which the curvature has no jump."""
+    around = np.concatenate([breaks - 1.0, breaks, breaks + 1.0])
+    return float(around[around <= u].max()), float(around[around > u].min())
 
 
-def _through(x: Array, degree: int) -> BSpline:
-    """The curve through vertices, which go on around the ring, where the spline has its ends."""
-    n = len(x)
-    return make_interp_spline(_fractions(n, _MORE), x[np.arange(-_MORE, n + _MORE) % n], k=degree)
+def _inside(margin: float, piece: Piece, u: float) -> bool:
+    """Whether a fraction of the ring lies in a part, but for a ``margin``."""
+    return piece[0] - margin <= u <= piece[1] + margin
 
 
-def _apart(curve: Curve, at: Array) -> Array:
+def _vertices(piece: Piece, n: int) -> NDArray[np.int_]:
+    """Numbers of the vertices of a part: vertex k is at (k + 1/2)/n, the breaks at edges k/n."""
+    return np.arange(*(round(end * n) for end in piece))
+
+
+def _through(x: Array, degree: int, piece: Piece) -> BSpline:
+    """The curve through the vertices of a part; the ring goes on around."""
+    k, n = _vertices(piece, len(x)), len(x)
+    return _spline(x[k % n], k, n, degree)
+
+
+def _spline(x: Array, k: NDArray[np.int_], n: int, degree: int) -> BSpline:
+    """The spline through vertices ``k`` of ``n``, of lower degree if they are few."""
+    return make_interp_spline((k + 0.5) / n, x, k=min(degree, len(k) - 1))
+
+
+def _between(strands: Sequence[Curve], at: Array) -> Array:
     """The vector (3,) between both strands."""
-    apart: Array = curve(at[0]) - curve(at[1])
-    return apart
+    between: Array = strands[0](at[0]) - strands[1](at[1])
+    return between

@@ -40,6 +40,7 @@ from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
 
+_SAME = 1e-7  # of values that Newton's method has found twice, from other starts
 _WIDTHS = (0.05, 0.15, FARTHEST)  # of s: how far on both sides it is looked for, in turn
 
 
@@ -68,6 +69,36 @@ def marked(family: Family, point: Point[Equilibrium], place: Place | None) -> Po
         return point
     seen = f"{family.rings[0].n_edges} edges only"
     return replace(point, details={**point.details, "seen_on": seen})
+
+
+def merged(
+    points: Sequence[Point[Equilibrium]], places: Sequence[Place | None]
+) -> tuple[list[Point[Equilibrium]], list[Place | None]]:
+    """Return points and places in path order, a self-crossing of the curve once.
+
+    The polygon may cross in two stages, which lead to the same crossing of the smooth curve.
+    """
+    kept: list[tuple[Point[Equilibrium], Place | None]] = []
+    for point, place in zip(points, places, strict=True):
+        if kept and _same_crossing(*kept[-1], point, place):
+            first, there = kept.pop()
+            after = point.details["linking_after"]
+            sides = first.sides and point.sides and (first.sides[0], point.sides[1])
+            details = {**first.details, "linking_after": after}
+            point, place = replace(first, sides=sides, details=details), there
+        kept.append((point, place))
+    return [point for point, _ in kept], [place for _, place in kept]
+
+
+def _same_crossing(
+    one: Point[Equilibrium], here: Place | None, other: Point[Equilibrium], there: Place | None
+) -> bool:
+    """Whether two neighbours are one crossing of the smooth curve: their values are the same."""
+    if {one.kind, other.kind} != {"contact"} or here is None or there is None:
+        return False
+    if here.own is None or there.own is None:
+        return False
+    return bool(np.allclose(here.values, there.values, rtol=_SAME, atol=_SAME))
 
 
 def _on_each_mesh(family: Family, point: Point[Equilibrium]) -> Array | None:
