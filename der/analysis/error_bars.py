@@ -51,11 +51,28 @@ class ErrorBars:
             return {"at_pi": at_pi, "mode": mode}
         k = self.values["gamma"].tolist().index(math.pi)
         moment, energy = (float(self.values[name][k]) for name in ("moment", "energy"))
-        stable = self.slope > 0.0 if mode.foldable else None
+        falls = self._falls(self.slope)
+        held = None if at_pi.index is None or falls is None else at_pi.index + falls
+        stable_3d = None if held is None else held == 0
+        # released without a load, a ring is free to move as at fixed moment, too
+        free, stays = at_pi.index_free, mode.stable_free
+        if stays and falls is not False:
+            free, stays = None, False if falls else None
+        there = replace(at_pi, moment=moment, energy=energy, slope=self.slope)
         return {
-            "at_pi": replace(at_pi, moment=moment, energy=energy, slope=self.slope),
-            "mode": replace(mode, stable=stable),
+            "at_pi": replace(there, index_moment=held, index_free=free),
+            "mode": replace(
+                mode,
+                stable=None if falls is None or not mode.foldable else not falls,
+                stable_3d=False if at_pi.index else stable_3d,
+                stable_free=stays,
+            ),
         }
+
+    def _falls(self, slope: float) -> bool | None:
+        """Whether M falls with gamma at pi; None: the error leaves it open."""
+        error = self.error["slope_at_pi"]
+        return slope < 0.0 if isinstance(error, float) and abs(slope) > error else None
 
 
 def error_bars(

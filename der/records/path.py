@@ -103,7 +103,7 @@ class Mode(Checked):
     OPTIONAL: ClassVar[tuple[str, ...]] = ("stable_free",)  # of records before it was there
 
     foldable: Truth
-    stable: Truth | None  # at fixed moment, by the slope: the paper's; None: not foldable
+    stable: Truth | None  # the paper's, by the slope; None: not foldable, or not known
     snapping: Annotated[str, one_of(SNAPPING)]
     stable_3d: Truth | None  # at fixed moment, by the index; None: not known
     stable_free: Truth | None = (

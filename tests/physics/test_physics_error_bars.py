@@ -358,6 +358,20 @@ def test_first_arrival_at_pi_is_known_again_on_enough_edges():
 
 
 @pytest.mark.parametrize(
+    ("h_over_t", "holds"), [(3.465, False), (3.46985, None), (3.471, True)], ids=str
+)
+def test_stability_at_pi_is_unknown_where_the_slope_is_within_its_error(h_over_t, holds):
+    """A circle becomes stable at pi at h/t = 3.46993 (boundary-value problem)."""
+    scene = der.Scene(der.circle(), der.rectangular_section(h_over_t), error_bars=True)
+    path = der.fold(replace(scene, n_edges=64))
+    mode, index = path.mode, {False: 1, None: None, True: 0}[holds]
+    assert mode.foldable
+    assert (mode.stable, mode.stable_3d, mode.stable_free) == (holds, holds, holds)
+    assert (path.at_pi.index, path.at_pi.index_moment) == (0, index)
+    assert path.at_pi.index_free == (0 if holds else None)
+
+
+@pytest.mark.parametrize(
     ("ring", "h_over_t", "nu", "gamma", "count"),
     [
         (der.circle(), 1.4774379970403035, 0.18919980323084623, 7 * math.pi / 8, 3),
