@@ -174,7 +174,7 @@ def _bars(
     scales: Array,
 ) -> ErrorBars:
     """Values and errors of points at their places on the extrapolated curve."""
-    corrections = Corrections.of(places, scales)
+    corrections = Corrections.of(family, places, scales)
     bounds = [corrections.bound(k) for k in range(len(places))]
     arrival = first_arrival(points)
     unsure = fold_near_pi(family, points, places, corrections)

@@ -52,6 +52,7 @@ class GrippedRing(RodSystem):
     symmetry: Mapping[str, tuple[int, SymmetryClass]]  # label -> (multiplicity, modes)
     arc_length: Array  # (n,) of the frames along the ring
     breaks: Array  # jumps of the curvature, as fractions of the ring's edges
+    kinks_in_cells: bool  # of the natural curvature: errors are not even in the cells' length
     parameter_name: str = field(default="gamma", kw_only=True)
 
     @cached_property
@@ -175,7 +176,8 @@ def gripped_ring(
         measure=measure,
         closed=closed,
     )
-    turned = ring.angle(s) + kink_offsets(ring, joints)[: len(s)]
+    offsets = kink_offsets(ring, joints)
+    turned = ring.angle(s) + offsets[: len(s)]
     angle = 0.5 * (turned - 0.5 * np.pi)  # half the turn about E1 from d3 = E3
     quat = np.stack([np.cos(angle), np.sin(angle), 0.0 * s, 0.0 * s], axis=1)
     supports, classes = {"full": _full, "half": _half, "quarter": _quarter}[name](rod)
@@ -186,7 +188,9 @@ def gripped_ring(
     }
     start = State(quat, np.zeros(len(s)), np.zeros(len(supports.target)), 0.0)
     return GrippedRing(
-        rod, supports, name, COPIES[name], start, classes, s, _breaks(ring, n_edges, finest)
+        *(rod, supports, name, COPIES[name], start, classes, s),
+        breaks=_breaks(ring, n_edges, finest),
+        kinks_in_cells=bool(offsets.any()),
     )
 
 
