@@ -147,7 +147,7 @@ WRONG = [
     (line("--sector", "third"), "--sector", "'third'", "auto, full, half, quarter"),
     (line("--json", "no/such/f.json"), "--json", "'no/such/f.json'", "folder"),
     (line("--json", "."), "--json", "'.'", "must be a file"),
-    (line("--json", ""), "--json", "'.'", "must be a file"),
+    (line("--json", ""), "--json", "''", "must be a file"),
     (line("--json", "p.png", "--plot", "./p.png"), "--json", "'p.png' twice", "of its own"),
     (line("--plot", "p.xyz"), "--plot", "'p.xyz'", ".png, .pdf, .svg"),
     (line("--plot", "p"), "--plot", "'p'", ".png, .pdf, .svg"),

@@ -62,7 +62,9 @@ EXPLAINED = frozenset(
         Reason.UNFOLDED,
     }
 )
-NOT_EXPLAINED = frozenset({Reason.CONVERGED, Reason.TURNED_BACK, Reason.INTERRUPTED})
+NOT_EXPLAINED = frozenset(
+    {Reason.CONVERGED, Reason.TURNED_BACK, Reason.INTERRUPTED, Reason.FOLD_NEAR_PI}
+)
 _EXPLAINED_NAMES = {REFUSED, *(not_converged(reason.word) for reason in EXPLAINED)}
 
 
