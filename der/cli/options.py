@@ -41,7 +41,10 @@ class RingOptions:
     r_over_a: float | None = option("Radius of the fillets, rectangle and triangle.")
     vertex_angle: float | None = option("Angle at the apex of a triangle, degrees.")
     natural_curvature: float | None = option("Natural curvature of a circle, in units of 1/a.")
-    axis: str | None = option("Twisting axis: x (grips at the short semi-axis), the default, or y.")
+    axis: str | None = option(
+        "Twisting axis: x, grips at the short semi-axis, or y. If not given: x; of a profile with "
+        "several axes, the one through its first point."
+    )
     h_over_t: float | None = option("Height over thickness of the section.")
     alpha: float | None = option("EI1/GJ, with --beta.")
     beta: float | None = option("EI2/GJ, with --alpha.")
@@ -72,8 +75,9 @@ class RingOptions:
             if value is None and name in own and self.shape != "circle":
                 raise ValueError(f"{name} must be given with SHAPE {self.shape}, got none")
         if (self.file is None) is (self.shape == "profile"):
+            given = "none" if self.file is None else repr(self.file)
             raise typer.TyperException(
-                f"FILE must be given with SHAPE profile, and with it only, got {self.file!r}"
+                f"FILE must be given with SHAPE profile, and with it only, got {given}"
             )
         if self.axis not in (None, "x", "y"):
             raise ValueError(f"axis must be x or y, got {self.axis!r}")

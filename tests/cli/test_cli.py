@@ -186,7 +186,7 @@ WRONG = [
         "x for",
     ),
     (shape("triangle", "--r-over-a", "0.1"), "--vertex-angle", "none", "given"),
-    (shape("profile"), "FILE", "None", "profile"),
+    (shape("profile"), "FILE", "none", "profile"),
     (shape("profile", "no.csv"), "FILE", "'no.csv'", "readable"),
     (("bvp", *line()[1:], "--tolerance", "1"), "--tolerance", "1.0", "1e-11 to 0.001"),
     (("bvp", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
@@ -206,8 +206,9 @@ WRONG = [
     (("landscape", *line()[1:], "--gamma-max", "1"), "--gamma-max", "1.0", "for a landscape"),
     (("landscape", *line()[1:], "--control", "angle"), "--control", "'angle'", "'arclength'"),
     *(
-        (line(option, "--quiet"), option, "'--quiet'", "must be a file name")
+        (line(option, value), option, repr(value), "must be a file name")
         for option in ("--json", "--plot", "--rrd", "--movie", "--html", "--out")
+        for value in ("--quiet", "")
     ),
     (line("--html", "x.html", "--beside", "--quiet"), "--beside", "'--quiet'", "a file name"),
     (("states", *line()[1:], "--json", "--quiet"), "--json", "'--quiet'", "a file name"),
@@ -221,6 +222,9 @@ WRONG = [
     (("phase", "ellipse", "--out", "d", "--check", "rod"), "--check", "'rod'", "'der'"),
     (("phase", "ellipse", "--out", "d", "--finest", "5"), "--finest", "5", "power of two"),
     (("phase", "ellipse", "--out", "d", "--range", "x=1:2"), "--range", "'x'", "h_over_t"),
+    (("figure", "fig2b", "--out", ""), "--out", "''", "must be a file name"),
+    (("phase", "ellipse", "--out", ""), "--out", "''", "must be a file name"),
+    (("fold", "profile", "--h-over-t", "4"), "FILE", "got none", "SHAPE profile"),
     (("figure", "fig99", "--out", "."), "NAME", "'fig99'", "fig2b"),
     ((*BAR, "--young", "3.5"), "--young", "'3.5'", "such as 3.5GPa"),
     ((*BAR, "--size", "100"), "--size", "'100'", "such as 100mm"),

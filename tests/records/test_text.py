@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from der.geometry.scale import Scale
 from der.records.path import AtPi, Mode, Path, Point, Timing, counts
 from der.records.text import summary
 
@@ -157,10 +158,19 @@ def test_a_record_from_disk_has_the_same_summary():
 
 def test_a_snap_says_what_it_releases_and_where_it_began():
     """Under a dead moment gamma moves far; with the angle held there is nothing to add."""
-    for start, end in ((0.5, "releases 2, from gamma = 0.5"), (2.5, "releases 2")):
+    for start, end in ((0.5, "releases 2 GJ/a, from gamma = 0.5"), (2.5, "releases 2 GJ/a")):
         details = {"energy_released": 2.0, "gamma_fold": start}
         rows = lines(points=(Point("snap", 2.5, 1.5, 7.0, 0, 0, 1, details),))
         assert any(row.endswith(end) for row in rows)
+
+
+def test_a_snap_with_units_says_them_and_shows_no_rounding():
+    """It ends without load: moment and energy there are digits of rounding."""
+    details = {"energy_released": 2.0, "gamma_fold": 2.5}
+    snap = Point("snap", 0.0, 3e-14, 9e-28, 0, 0, 1, details)
+    words = lines(points=(snap,), scale=Scale(0.1, 0.004, "N,mm"))
+    assert [row.split()[3:5] for row in words if row.startswith("snap")] == [["0", "0"]]
+    assert any("releases 80 N mm, from gamma = 2.5" in row for row in words)
 
 
 def test_a_moment_below_the_tolerance_is_zero():

@@ -13,7 +13,7 @@ from der.records.configurations import Shapes
 from der.records.path import AtPi, Mode, Path, Point, Timing, counts
 from der.viz.palette import STRETCHES
 from der.viz.plots.path import draw
-from der.viz.plots.style import save
+from der.viz.plots.style import blank, save
 
 STABLE, UNSTABLE, UNKNOWN = (STRETCHES[key].label for key in (True, False, None))
 
@@ -270,3 +270,14 @@ def test_path_is_the_same_after_drawing():
     before = replace(subject).to_json()
     draw(subject)
     assert subject.to_json() == before
+
+
+@pytest.mark.parametrize("width", [5.7, 6.5, 8.0])
+def test_a_long_title_fits_into_its_picture(width):
+    """Letters of a smaller size are not narrower in proportion."""
+    name = "profile, reference length = 100, curvature error = 0.11, resolution = 0.01"
+    rest = "   |   h/t = 10, ν = 0.35   |   a = 100 mm   |   in its plane"
+    figure = blank(width, 3.0, name + rest)
+    box = figure.texts[0].get_window_extent()
+    assert box.x0 > 0.01 * figure.bbox.width
+    assert box.x1 < 0.99 * figure.bbox.width

@@ -35,7 +35,7 @@ def lines(path: Path) -> list[str]:
             column(path, "U", "energy", 12),
             ("  index", 0),
         )
-        found += ["", *table(heads, [_row(point, form(path, ".7f")) for point in path.points])]
+        found += ["", *table(heads, [_row(point, path) for point in path.points])]
     if path.at_pi is not None:
         found += ["", _at_pi(path.at_pi, path)]
     if path.points or path.at_pi is not None:
@@ -68,11 +68,14 @@ def mode_text(mode: Mode) -> str:
     return ", ".join(parts)
 
 
-def _row(point: Point, digits: str) -> tuple[str, ...]:
+def _row(point: Point, path: Path) -> tuple[str, ...]:
+    digits, least = form(path, ".7f"), floor(path)
     index = change(point.index_before, point.index_after)
     extra = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in point.details.items())
     if point.kind == "snap":
-        extra = f"releases {point.details['energy_released']:.7g}"
+        energy: Any = point.details["energy_released"]
+        released = number(energy, ".7g", least)
+        extra = f"releases {released} {unit(path.scale, 'energy')}"
         start = point.details.get("gamma_fold")
         if isinstance(start, float) and abs(start - point.gamma) > _FAR:
             extra += f", from gamma = {start:.7g}"
@@ -80,8 +83,8 @@ def _row(point: Point, digits: str) -> tuple[str, ...]:
         point.kind,
         number(point.gamma, ".8f"),
         number(point.gamma / math.pi, ".6f"),
-        number(point.moment, digits),
-        number(point.energy, digits),
+        number(point.moment, digits, least),
+        number(point.energy, digits, least),
         f"  {index:7} {extra}",
     )
 

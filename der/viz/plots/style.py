@@ -67,8 +67,10 @@ def blank(width: float, height: float, title: str, *, dpi: int = DPI) -> Figure:
     FigureCanvasAgg(figure)
     text = figure.text(0.5, 1.0 - 0.17 / height, title, fontsize=9.5, color=INK)
     text.set(ha="center", va="center")
-    widest = 0.97 * figure.bbox.width / text.get_window_extent().width
-    text.set_fontsize(9.5 * min(1.0, widest))
+    size, room = 9.5, 0.97 * figure.bbox.width
+    while (wide := text.get_window_extent().width) > room:  # hinting: not in proportion to size
+        size *= 0.99 * room / wide
+        text.set_fontsize(size)
     return figure
 
 
