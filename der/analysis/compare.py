@@ -127,16 +127,18 @@ def _distance(
     name : "moment" or "energy".
     place : gamma and value of the rod.
     """
-    at, (gamma, value) = point.solution, place
-    slope = at.slope if name == "moment" else 4.0 * at.moment
-    steep = slope * math.pi / scale
-    rise = getattr(at, name) + slope * (gamma - at.gamma)
-    distance = abs(value - rise) / scale / math.hypot(1.0, steep)
+    at = point.solution
+    # rates of gamma and of the value: the moment's is not dM/dgamma, which a fold has not
+    rates = (at.parameter_rate, at.moment_rate) if name == "moment" else (1.0, 4.0 * at.moment)
+    flat, steep = rates[0] / math.pi, rates[1] / scale
+    flat, steep = flat / math.hypot(flat, steep), steep / math.hypot(flat, steep)
+    away = (place[0] - at.gamma) / math.pi, (place[1] - getattr(at, name)) / scale
+    distance = abs(away[1] * flat - away[0] * steep)
     if errors is None:
         return distance, None
     vertical = (errors[name] + getattr(point.error, name)) / scale
     horizontal = (errors["gamma"] + point.error.gamma) / math.pi
-    return distance, (vertical + abs(steep) * horizontal) / math.hypot(1.0, steep)
+    return distance, vertical * abs(flat) + horizontal * abs(steep)
 
 
 def _errors(rod: Path, k: int) -> Mapping[str, float] | None:

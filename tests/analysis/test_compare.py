@@ -3,13 +3,14 @@
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from shapes import KINKS
 
 import der
-from der.analysis.compare import compare
+from der.analysis.compare import _distance, compare
 from der.bvp.solve import solve_bvp
 from der.cli.commands import main
 from der.records.path import Path
@@ -145,3 +146,12 @@ def test_a_state_beyond_the_last_gamma_is_held_against_the_fold(scene, rod):
     (state,) = [one for one in found.states if one.gamma == gamma[k]]
     assert state.agrees
     assert found.unmatched == 0
+
+
+def test_a_state_at_a_fold_is_held_against_its_vertical_tangent():
+    """There dM/dgamma does not exist: the distance is that in gamma."""
+    at = SimpleNamespace(gamma=1.0, moment=2.0, energy=5.0, parameter_rate=0.0, moment_rate=0.3)
+    point = SimpleNamespace(solution=at, error=SimpleNamespace(gamma=0.0, moment=0.0, energy=0.0))
+    errors = {"gamma": 0.2 * math.pi, "moment": 1.0, "energy": 1.0}
+    found = _distance("moment", (1.0 + 0.1 * math.pi, 9.0), point, 2.0, errors)
+    assert found == pytest.approx((0.1, 0.2))
