@@ -265,10 +265,14 @@ def forward(piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w
     size = w.shape[1]
     constants(piece.loads, p, m0, force)
     _ends(piece.quarter, piece.start, piece.end, p, gamma, nodes[0], d_start, target[0], target[1])
-    dq[:] = 0.0
-    dr[:] = 0.0
-    dq[0 if piece.quarter else p.size] = d_start
-    places[0] = 0.0
+    turned = 0 if piece.quarter else p.size
+    for c in range(dq.shape[0]):
+        for a in range(4):
+            dq[c, a] = d_start[a] if c == turned else 0.0
+        for k in range(3):
+            dr[c, k] = 0.0
+    for k in range(3):
+        places[0, k] = 0.0
     sign = 1
     for i in range(len(h)):
         stages(h[i], places[i], frames[i], inner.at, inner.d)
@@ -278,7 +282,9 @@ def forward(piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w
         sign *= eliminate(w)
         if sign == 0:
             return 0
-        z[i] = w[size:]
+        for c in range(z.shape[1]):
+            for row in range(size):
+                z[i, c, row] = w[size + c, row]
         _carry(
             h[i], frames[i], inner, z[i], nodes[i], places[i], nodes[i + 1], places[i + 1], dq, dr
         )

@@ -35,6 +35,15 @@ LARGEST = 2.0  # Newton's method has diverged if a frame's increment is larger
 
 
 @njit(cache=True)
+def total(h):
+    """Length of the sector, from those of its intervals."""
+    length = 0.0
+    for i in range(h.size):
+        length += h[i]
+    return length
+
+
+@njit(cache=True)
 def _vector_part(target, q, out):
     """Vector part of conj(target) o q."""
     out[0] = target[0] * q[1] - target[1] * q[0] - target[2] * q[3] + target[3] * q[2]
@@ -52,8 +61,10 @@ def border(h, along, along_gamma, z, node, place, dq, dr, target, out):
     G, R = n_p, n_p + 1
     n, m = along.shape[:2]
     vec = np.empty(3)
-    length = h.sum()
-    out[:] = 0.0
+    length = total(h)
+    for c in range(R + 2):
+        for k in range(n_p + 1):
+            out[c, k] = 0.0
     for c in range(R + 1):
         _vector_part(target[0], dq[c], vec)
         for k in range(3):
@@ -76,7 +87,8 @@ def border(h, along, along_gamma, z, node, place, dq, dr, target, out):
                 for c in range(R + 1):
                     out[c, n_p] += factor * z[i, c, 4 * j + a]
     out[G, n_p] += along_gamma
-    out[R] *= -1.0
+    for k in range(n_p + 1):
+        out[R, k] *= -1.0
     out[R + 1, n_p] = 1.0
 
 
@@ -87,7 +99,7 @@ def move(h, z, step, rates, frames, out_tangent):
     n_q, rows = len(rates), z.shape[2]  # p and gamma; 4 m
     change, along = np.empty(rows), np.empty(rows)
     size, square = 0.0, 0.0
-    length = h.sum()
+    length = total(h)
     for i in range(n):
         for row in range(rows):
             change[row], along[row] = z[i, n_q, row], 0.0
@@ -181,11 +193,16 @@ def correct(
             break
         step, rates = small[R], small[R + 1]
         if by_gamma:  # less what the tangent adds to gamma
-            step -= step[G] / rates[G] * rates
+            share = step[G] / rates[G]
+            for c in range(n_p):
+                step[c] -= share * rates[c]
             step[G] = 0.0
         size, square = move(h, z, step, rates, frames, out_tangent)
         unit = 1.0 / np.sqrt(square + rates[G] * rates[G])
-        out_tangent *= unit
+        for i in range(n):
+            for j in range(m):
+                for a in range(4):
+                    out_tangent[i, j, a] *= unit
         tangent_gamma = unit * rates[G]
         rate = unit * _moment_rate(loads, p, out_places[n], dr, rates)
         for c in range(n_p):

@@ -9,55 +9,52 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from der.problem import Array, Increment
+from der.problem import Increment
 
 _APART = 0.1  # of a step: closer solutions would add rounding errors
 _MOST = 3  # solutions kept to interpolate between
 
 
 @njit(cache=True)
-def _weights(u, length, places):
-    """Weights (3 + k,), at ``u`` of a ``length``, of the rows of an interpolant.
+def _weight(row, u, length, places):
+    """Weight of a row of an interpolant, at ``u`` of a ``length``.
 
     Hermite's for the first three, Lagrange's for the others.
     """
-    k = places.shape[0]
-    weights = np.empty(3 + k)
-    weights[0] = length * u * (1.0 - u) ** 2
-    weights[1] = u * u * (3.0 - 2.0 * u)
-    weights[2] = length * u * u * (u - 1.0)
-    for i in range(k):
-        weights[3 + i] = (u * (1.0 - u)) ** 2
-        for j in range(k):
-            if j != i:
-                weights[3 + i] *= (u - places[j]) / (places[i] - places[j])
-    return weights
+    if row == 0:
+        return length * u * (1.0 - u) ** 2
+    if row == 1:
+        return u * u * (3.0 - 2.0 * u)
+    if row == 2:
+        return length * u * u * (u - 1.0)
+    weight = (u * (1.0 - u)) ** 2
+    for j in range(places.shape[0]):
+        if j != row - 3:
+            weight *= (u - places[j]) / (places[row - 3] - places[j])
+    return weight
 
 
 @njit(cache=True)
-def on_curve(u, length, places, rows):
+def on_curve(u, length, places, rows, out_increment):
     """Increment (m,) to ``u`` of the ``length`` of a step; see `Interpolant`.
 
     Parameters
     ----------
     places : (k,). rows : (3 + k, m).
     """
-    m = rows.shape[1]
-    away = np.zeros(m)
-    weights = _weights(u, length, places)
-    for k in range(weights.shape[0]):
-        for i in range(m):
-            away[i] += weights[k] * rows[k, i]
-    return away
+    for i in range(out_increment.shape[0]):
+        out_increment[i] = 0.0
+    for k in range(3 + places.shape[0]):
+        weight = _weight(k, u, length, places)
+        for i in range(out_increment.shape[0]):
+            out_increment[i] += weight * rows[k, i]
 
 
 @njit(cache=True)
-def combined(a, x, b, y, c, z):
-    """Return a x + b y + c z of three increments (m,)."""
-    total = np.empty(x.shape[0])
+def combined(a, x, b, y, c, z, out_increment):
+    """Sum a x + b y + c z of three increments (m,)."""
     for i in range(x.shape[0]):
-        total[i] = a * x[i] + b * y[i] + c * z[i]
-    return total
+        out_increment[i] = a * x[i] + b * y[i] + c * z[i]
 
 
 class Interpolant:
@@ -77,7 +74,8 @@ class Interpolant:
     def _at(self, s: float, known: int) -> Increment:
         """Increment to ``s`` by the cubic and the first ``known`` solutions, (m,)."""
         places = np.array(self._places[:known])
-        increment: Array = on_curve(s / self.length, self.length, places, self._rows[: 3 + known])
+        increment = np.empty(self._rows.shape[1])
+        on_curve(s / self.length, self.length, places, self._rows, increment)
         return increment
 
     def at(self, s: float) -> Increment:

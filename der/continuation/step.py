@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Generic
 
+import numpy as np
+
 from der.continuation.interpolant import Interpolant, combined
 from der.continuation.roots import brent, find_root, smooth_root
 from der.errors import ContinuationFailed, Reason
@@ -65,7 +67,8 @@ class Step(Generic[S]):
         u = s / inner(t, jump)
         of_start = s * u * (1.0 + u) / inner(t, first)
         of_end, of_jump = s * (1.0 + u) ** 2, -u * u * (3.0 + 2.0 * u)
-        increment: Increment = combined(of_end, t, of_start, first, of_jump, jump)
+        increment = np.empty_like(t)
+        combined(of_end, t, of_start, first, of_jump, jump, increment)
         return increment
 
     @property

@@ -54,11 +54,15 @@ class Centre(NamedTuple):
 
 
 @njit(cache=True)
-def _shoot(piece, h, rest, frames, p, gamma, iterations, tolerance):
-    """Newton's method for the frames only, in place; mesh points, G and G_x."""
+def _shoot(
+    piece, h, rest, frames, p, gamma, iterations, tolerance, nodes, places, out_missed, out_rates
+):
+    """Newton's method for the frames only, in place; returns whether it converged.
+
+    Fills also mesh points, G and G_x.
+    """
     n, m = rest.shape
     n_p = p.size
-    nodes, places = np.empty((n + 1, 4)), np.empty((n + 1, 3))
     z = np.empty((n, n_p + 2, 4 * m))
     dq, dr = np.empty((n_p + 2, 4)), np.empty((n_p + 2, 3))
     w = np.empty((4 * m + n_p + 2, 4 * m))
@@ -78,17 +82,26 @@ def _shoot(piece, h, rest, frames, p, gamma, iterations, tolerance):
         if size < tolerance:
             ok = True
             break
-    along[:] = 0.0
+    for i in range(n):
+        for j in range(m):
+            for a in range(4):
+                along[i, j, a] = 0.0
     border(h, along, 1.0, z, nodes[n], places[n], dq, dr, target, small)
-    return ok, nodes, places, -small[n_p + 1, :n_p], small[: n_p + 1, :n_p].T.copy()
+    for k in range(n_p):
+        out_missed[k] = -small[n_p + 1, k]
+        for c in range(n_p + 1):
+            out_rates[k, c] = small[c, k]
+    return ok
 
 
 def shot(system: Collocation, mesh: Mesh, frames: Array, x: Array) -> Shot:
     """The rod shot with p and gamma, from frames nearby."""
     frames = frames.copy()
     piece, p = system.sector.piece, x[:-1].copy()
-    ok, nodes, places, missed, rates = _shoot(piece, mesh.h, mesh.rest, frames, p, x[-1], 12, SHOT)
-    return Shot(frames, nodes, places, missed, rates, ok and bool(np.isfinite(rates).all()))
+    n, n_p = len(mesh.h), len(p)
+    found = (np.empty((n + 1, 4)), np.empty((n + 1, 3)), np.empty(n_p), np.empty((n_p, n_p + 1)))
+    ok = _shoot(piece, mesh.h, mesh.rest, frames, p, x[-1], 12, SHOT, *found)
+    return Shot(frames, *found, ok and bool(np.isfinite(found[-1]).all()))
 
 
 def centre(
