@@ -114,7 +114,7 @@ def _extrapolated(
         place if place is None or place.sought else located(family, point, place, scales)
         for point, place in zip(points, placed(family, points, asked), strict=True)
     ]
-    points = [marked(family, *one) for one in zip(points, places, strict=True)]
+    points = [marked(*one) for one in zip(points, places, strict=True)]
     order = _order(arc_lengths(rings[0], points), places)
     points, places = merged(_certain(points, order), [places[k] for k in order])
     return _bars(family, points, places, scales)

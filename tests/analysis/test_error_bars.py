@@ -10,7 +10,7 @@ import pytest
 import der
 import der.records.path
 from der.analysis.error_bars import ErrorBars, error_bars
-from der.analysis.extrapolation import located
+from der.analysis.extrapolation import curve, located
 from der.analysis.extrapolation.curve import GAMMA, Family, Goal, Matched, _found, placed
 from der.analysis.request import Request
 from der.continuation.richardson import limit, romberg
@@ -263,19 +263,32 @@ def test_gamma_is_not_sought_round_a_fold():
     assert _found(Goal(GAMMA, 0.0, direction=-1.0), 0.0, here, 1.0, bend) is None
 
 
-def test_a_self_crossing_that_depends_on_the_mesh_is_marked(monkeypatch):
+def test_a_self_crossing_without_an_error_says_why(monkeypatch):
     """A crossing of the polygon that is none of the smooth curve: errors null, and said so."""
+    why = "because it was not found on every mesh"
     monkeypatch.setattr(located, "smooth_crossing", lambda *_, **__: None)
     path = der.fold(der.Scene(der.circle(), der.rectangular_section(4.0), error_bars=True))
     assert path.contacts
     for point in path.contacts:
         assert path.error["gamma"][point.position] is None
-        assert point.details["seen_on"] == "64 edges only"
+        assert point.details["no_error_bar"] == why
     none = len(path.contacts)
     assert f"null at {none} of" in path.error["how"]
     told = lines(path)
-    assert sum("seen on 64 edges only" in line for line in told) == none
+    assert sum(f"no error bar {why}" in line for line in told) == none
     assert any(f"none at {none} of" in line for line in told)
+
+
+def test_a_fold_that_coarser_meshes_do_not_reach_says_why(monkeypatch):
+    """Without matched states nothing is said of what coarser meshes have."""
+    monkeypatch.setattr(curve, "restricted", lambda *_: None)
+    points = solved(1.6, 64)[1]
+    bars = error_bars(solved(1.6, 64)[0], asking(math.pi), points)
+    folds = [point for point in bars.points if point.kind == "fold"]
+    assert folds
+    why = "because coarser meshes could not be compared"
+    assert all(point.details["no_error_bar"] == why for point in folds)
+    assert not any(point.details for point in bars.points if point.kind == "")
 
 
 def test_how_names_the_meshes():

@@ -6,8 +6,8 @@ a branch point as on any path, a self-crossing as that of the smooth curve (`cro
 gamma, M and U then have errors in even powers of h, as those of states. Its place on the path is
 where the extrapolated curve has its extrapolated values.
 
-A self-crossing of the polygon that is none of the smooth curve, on each mesh, is marked. As the
-points that are not found on a coarser mesh, it has no errors.
+A point that is not found on every mesh, as a self-crossing of the polygon that is none of the smooth
+curve, has no errors and says so.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import State
 
 _SAME = 1e-7  # of values that Newton's method has found twice, from other starts
+_NOT_COMPARED = "coarser meshes could not be compared"  # they have no matched state
+_NOT_FOUND = "it was not found on every mesh"
 _WIDTHS = (0.05, 0.15, FARTHEST)  # of s: how far on both sides it is looked for, in turn
 
 
@@ -63,12 +65,12 @@ def located(family: Family, point: Point[Equilibrium], place: Place, scales: Arr
     return place if found is None else replace(found, values=values, own=own, unsure=unsure)
 
 
-def marked(family: Family, point: Point[Equilibrium], place: Place | None) -> Point[Equilibrium]:
-    """Return the point, marked if it is a self-crossing that depends on the mesh."""
-    if point.kind != "contact" or place is None or place.sought:
+def marked(point: Point[Equilibrium], place: Place | None) -> Point[Equilibrium]:
+    """Return the point; one of a kind without an error says why it has none."""
+    if point.kind == "" or (place is not None and place.sought):
         return point
-    seen = f"{family.rings[0].n_edges} edges only"
-    return replace(point, details={**point.details, "seen_on": seen})
+    why = _NOT_COMPARED if place is None else _NOT_FOUND
+    return replace(point, details={**point.details, "no_error_bar": f"because {why}"})
 
 
 def merged(
