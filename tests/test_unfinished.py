@@ -1,6 +1,8 @@
 """Ctrl-C and alarms: where they may raise, and that none is lost."""
 
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -104,3 +106,38 @@ def test_handlers_are_put_back():
             assert signal.getsignal(signal.SIGINT) not in (usual, ours)
         assert signal.getsignal(signal.SIGINT) is ours
     assert signal.getsignal(signal.SIGINT) is usual
+
+
+LOADING = """
+import signal, sys
+
+class Pressed:
+    def find_spec(name, path, target=None):
+        if name == "der.cli.output":
+            signal.raise_signal({number})
+
+sys.meta_path.insert(0, Pressed)
+sys.argv[1:] = ["--version"]
+signal.signal({number}, signal.{handler})
+from der.__main__ import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "handler"), [("SIGINT", "default_int_handler"), ("SIGTERM", "SIG_DFL")]
+)
+def test_the_command_hears_while_it_loads(number, handler):
+    """One line and code 130, as later; Python alone prints a traceback, or dies of it."""
+    code = LOADING.format(number=f"signal.{number}", handler=handler)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr == "der: stopped by the user\n"
+
+
+def test_a_command_that_must_not_hear_does_not():
+    """Of a batch: `nohup` and shells have set the signal to be ignored."""
+    code = LOADING.format(number="signal.SIGINT", handler="SIG_IGN")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("der ")

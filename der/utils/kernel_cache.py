@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from pathlib import Path as File
 
 FOLDER = "NUMBA_CACHE_DIR"  # environment: numba's folder, before its others
@@ -24,6 +23,7 @@ def keep_kernels(package: File) -> None:
         return
     import atexit
     import shutil
+    import tempfile
 
     folder = tempfile.mkdtemp(prefix="der-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -48,6 +48,8 @@ def _of_user() -> File:
 
 def _writable(folder: File) -> bool:
     """Whether a folder can be written to, or made: tried as numba does, rights do not tell all."""
+    import tempfile
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()

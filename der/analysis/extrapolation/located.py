@@ -6,8 +6,8 @@ a branch point as on any path, a self-crossing as that of the smooth curve (`cro
 gamma, M and U then have errors in even powers of h, as those of states. Its place on the path is
 where the extrapolated curve has its extrapolated values.
 
-A point that is not found on every mesh, as a self-crossing of the polygon that is none of the smooth
-curve, has no errors and says so.
+A point that is not found on every mesh, as a self-crossing of the polygon that is none of the
+smooth curve, has no errors and says so.
 """
 
 from __future__ import annotations
