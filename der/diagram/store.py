@@ -32,7 +32,7 @@ class Store:
     Raises
     ------
     ValueError
-        If another process has the file open, or it is no store.
+        If another process has the file open, or it is no store, or none of its cases can be read.
     OSError
         If it cannot be read or written.
     """
@@ -47,10 +47,10 @@ class Store:
                 self._open.text_factory = partial(str, encoding="utf-8", errors="replace")
                 self._lock()
                 lines = self._open.execute("SELECT row FROM cases").fetchall()
-            self.rows.update(_readable(line for (line,) in lines))
+            self.rows.update(_some_readable(self.file, (line for (line,) in lines)))
             if not lines and (older := self.file.with_suffix(".jsonl")).is_file():
                 with older.open(encoding="utf-8", errors="replace") as content:
-                    self.add(dict(_readable(content)).values())
+                    self.add(_some_readable(older, content).values())
         except BaseException:
             self._open.close()
             raise
@@ -111,6 +111,16 @@ class Store:
             number = errno.ENOSPC if code == "SQLITE_FULL" else errno.EIO
             words = f"{problem}; {len(self)} cases are safe"
             raise OSError(number, words, str(self.file)) from problem
+
+
+def _some_readable(file: File, lines: Iterable[str]) -> dict[str, Row]:
+    """Rows by their keys; of many lines some must be such, or all would be solved again."""
+    kept = list(lines)
+    rows = dict(_readable(kept))
+    if len(kept) > 1 and not rows:
+        words = f"none of its {len(kept)} lines is a case; move it away to solve all of them"
+        raise ValueError(f"{file} is no store of cases: {words}")
+    return rows
 
 
 def _readable(lines: Iterable[str]) -> Iterator[tuple[str, Row]]:

@@ -230,6 +230,17 @@ def test_cases_of_an_older_version_are_taken_over(tmp_path, undisturbed):
     assert scanned(TOY, tmp_path / "cases.sqlite", Here()).solved == 0
 
 
+@pytest.mark.parametrize("junk", [b"junk\n" * 1000, b"{}\n[]\n", bytes(range(256)) * 9])
+def test_older_cases_of_which_none_can_be_read_are_refused(tmp_path, junk):
+    """All of them were solved again, without a word."""
+    (tmp_path / "cases.jsonl").write_bytes(junk)
+    with pytest.raises(ValueError, match=r"cases.jsonl is no store of cases: none of its \d+ line"):
+        Store(tmp_path / "cases.sqlite")
+    (tmp_path / "cases.jsonl").write_bytes(b'{"key": "torn')  # a run that was killed at once
+    with Store(tmp_path / "cases.sqlite") as store:
+        assert len(store) == 0
+
+
 @pytest.mark.parametrize(
     "make",
     [
