@@ -125,7 +125,7 @@ class PlanarRodSystem:
         """
         turn = b.phi - a.phi
         if self.pin is not None:
-            turn = turn - self.pin * (self.pin @ turn) / (self.pin @ self.pin)
+            turn = turn - self.pin * np.sum(self.pin * turn) / np.sum(self.pin**2)
         return np.concatenate([turn, b.force - a.force, [b.load - a.load]])
 
     def transport(self, along: Increment, rates: Increment) -> Increment:
@@ -134,7 +134,8 @@ class PlanarRodSystem:
 
     def inner(self, a: Increment, b: Increment) -> float:
         """Return the inner product, weighted by the lengths of the edges."""
-        return float((self._weight * a) @ b)
+        # no product of BLAS: its threads wait for each other where other processes run
+        return float(np.sum(self._weight * a * b))
 
     def indices(
         self, state: PlanarConfiguration, symmetry: str | None = None
