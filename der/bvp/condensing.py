@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from der.bvp.equations import directors, product, stage
 from der.bvp.gauss import Array, rule
+from der.packs.kernel import kernel
 
 # the rule's tables are constants to the kernels, see `gauss.Rule`
 WEIGHTS, PARTIAL, SLOPE = rule().weights, rule().partial, rule().slope
@@ -47,7 +47,7 @@ class Inner(NamedTuple):
     bent: Array  # (3, 4 m) change of q' by the tangents of one stage
 
 
-@njit(cache=True)
+@kernel
 def workspace(m):
     """Workspace for intervals of m stages."""
     return Inner(
@@ -63,7 +63,7 @@ def workspace(m):
     )
 
 
-@njit(cache=True)
+@kernel
 def eliminate(w):
     """Solve in place: (n + c, n) columns of [matrix | right-hand sides]; the determinant's sign.
 
@@ -99,7 +99,7 @@ def eliminate(w):
     return sign
 
 
-@njit(cache=True)
+@kernel
 def _ends(quarter, start, end, p, gamma, out_q0, out_dq0, out_target, out_dtarget):
     """Frame at the start, its derivative by the parameter that turns it, and the same at the end.
 
@@ -120,7 +120,7 @@ def _ends(quarter, start, end, p, gamma, out_q0, out_dq0, out_target, out_dtarge
     product(spin, end, out_dtarget)
 
 
-@njit(cache=True)
+@kernel
 def constants(loads, p, out_m0, out_force):
     """Moment m0 at the start, and force, from p."""
     for k in range(3):
@@ -130,7 +130,7 @@ def constants(loads, p, out_m0, out_force):
             out_force[k] += loads[3 + k, c] * p[c]
 
 
-@njit(cache=True)
+@kernel
 def stages(h, place, frames, out_at, out_d):
     """Positions and directors at the stages of an interval that starts at ``place``."""
     m = frames.shape[0]
@@ -144,7 +144,7 @@ def stages(h, place, frames, out_at, out_d):
             out_at[j, k] = place[k] + h * total
 
 
-@njit(cache=True)
+@kernel
 def moment_at(m0, force, at, out):
     """Moment at a position: m0 + F x r."""
     out[0] = m0[0] + force[1] * at[2] - force[2] * at[1]
@@ -152,7 +152,7 @@ def moment_at(m0, force, at, out):
     out[2] = m0[2] + force[0] * at[1] - force[1] * at[0]
 
 
-@njit(cache=True)
+@kernel
 def _right_hand_sides(piece, rest, m0, force, frames, inner, moment, turn):
     """Fill ``inner``, except for positions and directors, which are known."""
     for j in range(frames.shape[0]):
@@ -172,7 +172,7 @@ def _right_hand_sides(piece, rest, m0, force, frames, inner, moment, turn):
             inner.fx[2, row] = f1 * force[1] - f2 * force[0]
 
 
-@njit(cache=True)
+@kernel
 def _matrix(h, inner, out_w):
     """The interval's matrix, times h: slopes less what q' gains, directly and by the positions."""
     m, size = inner.f.shape[0], out_w.shape[1]
@@ -194,7 +194,7 @@ def _matrix(h, inner, out_w):
                 out_w[column, 4 * i + a] -= h * inner.fq[i, a, b]
 
 
-@njit(cache=True)
+@kernel
 def _columns(loads, h, node, frames, dq, dr, inner, out_w):
     """The interval's right-hand sides, times h: variations with p, gamma; the residual's last."""
     m, size = inner.f.shape[0], out_w.shape[1]
@@ -223,7 +223,7 @@ def _columns(loads, h, node, frames, dq, dr, inner, out_w):
             out_w[size + n_c - 1, 4 * j + a] -= slope - h * inner.f[j, a]
 
 
-@njit(cache=True)
+@kernel
 def _carry(h, frames, inner, z, node, place, out_node, out_place, out_dq, out_dr):
     """Right end of an interval, with its variations, from the left one's and the stages'."""
     m = inner.f.shape[0]
@@ -252,7 +252,7 @@ def _carry(h, frames, inner, z, node, place, out_node, out_place, out_dq, out_dr
         out_dr[c, 2] += h * r3
 
 
-@njit(cache=True)
+@kernel
 def forward(piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target):
     """Eliminate all intervals, one after the other; returns the determinant's sign, 0 if singular.
 

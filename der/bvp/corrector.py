@@ -17,7 +17,6 @@ O(n) in the number of intervals n.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from der.bvp.condensing import (
     WEIGHTS,
@@ -29,12 +28,13 @@ from der.bvp.condensing import (
     stages,
     workspace,
 )
+from der.packs.kernel import kernel
 
 CONVERGED, DIVERGED, SLOW, SINGULAR = 0, 1, 2, 3
 LARGEST = 2.0  # Newton's method has diverged if a frame's increment is larger
 
 
-@njit(cache=True)
+@kernel
 def total(h):
     """Length of the sector, from those of its intervals."""
     length = 0.0
@@ -43,7 +43,7 @@ def total(h):
     return length
 
 
-@njit(cache=True)
+@kernel
 def _vector_part(target, q, out):
     """Vector part of conj(target) o q."""
     out[0] = target[0] * q[1] - target[1] * q[0] - target[2] * q[3] + target[3] * q[2]
@@ -51,7 +51,7 @@ def _vector_part(target, q, out):
     out[2] = target[0] * q[3] - target[1] * q[2] + target[2] * q[1] - target[3] * q[0]
 
 
-@njit(cache=True)
+@kernel
 def border(h, along, along_gamma, z, node, place, dq, dr, target, out):
     """The small system's columns: conditions at the far end, and the row of the tangent.
 
@@ -92,7 +92,7 @@ def border(h, along, along_gamma, z, node, place, dq, dr, target, out):
     out[R + 1, n_p] = 1.0
 
 
-@njit(cache=True)
+@kernel
 def move(h, z, step, rates, frames, out_tangent):
     """Add the increment to the frames; returns its size and the tangent's square, frames' part."""
     n, m = frames.shape[:2]
@@ -119,7 +119,7 @@ def move(h, z, step, rates, frames, out_tangent):
     return size, square
 
 
-@njit(cache=True)
+@kernel
 def correct(
     quarter,
     stiffness,
@@ -222,7 +222,7 @@ def correct(
     return status, done, gamma, tangent_gamma, rate, orientation, moment, energy
 
 
-@njit(cache=True)
+@kernel
 def _moment_rate(loads, p, place, dr, rates):
     """Rate of M = -m3 at the end, m3 = m03 + F1 r2 - F2 r1."""
     m0, force = np.empty(3), np.empty(3)
@@ -235,7 +235,7 @@ def _moment_rate(loads, p, place, dr, rates):
     return total
 
 
-@njit(cache=True)
+@kernel
 def observe(piece, h, rest, frames, p):
     """Moment of one arm M = -m3 at the end, and the sector's energy; (A.7), (A.21)."""
     n, m = rest.shape

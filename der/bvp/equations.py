@@ -17,10 +17,10 @@ Kernels: scalars and small arrays, `out_*` last.
 
 from __future__ import annotations
 
-from numba import njit
+from der.packs.kernel import kernel
 
 
-@njit(cache=True, inline="always")
+@kernel
 def directors(q, out_d):
     """Rows d1, d2, d3 (A.10), as quadratic forms of q."""
     a, b, c, d = q[0], q[1], q[2], q[3]
@@ -35,7 +35,7 @@ def directors(q, out_d):
     out_d[2, 2] = a * a - b * b - c * c + d * d
 
 
-@njit(cache=True)
+@kernel
 def stage(q, moment, rest, stiffness, d, turn, out_f, out_fq, out_fm, out_gq):
     """Right-hand side q' at one point, its derivatives by q and by the moment, and that of d3 by q.
 
@@ -91,7 +91,7 @@ def stage(q, moment, rest, stiffness, d, turn, out_f, out_fq, out_fm, out_gq):
     out_gq[2, 0], out_gq[2, 1], out_gq[2, 2], out_gq[2, 3] = 2 * a, -2 * b, -2 * c, 2 * e
 
 
-@njit(cache=True)
+@kernel
 def product(p, q, out):
     """Quaternion product p o q."""
     out[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]

@@ -7,15 +7,15 @@ with few unknowns.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from der.packs.kernel import kernel
 from der.problem import Increment
 
 _APART = 0.1  # of a step: closer solutions would add rounding errors
 _MOST = 3  # solutions kept to interpolate between
 
 
-@njit(cache=True)
+@kernel
 def _weight(row, u, length, places):
     """Weight of a row of an interpolant, at ``u`` of a ``length``.
 
@@ -34,7 +34,7 @@ def _weight(row, u, length, places):
     return weight
 
 
-@njit(cache=True)
+@kernel
 def on_curve(u, length, places, rows, out_increment):
     """Increment (m,) to ``u`` of the ``length`` of a step; see `Interpolant`.
 
@@ -50,7 +50,7 @@ def on_curve(u, length, places, rows, out_increment):
             out_increment[i] += weight * rows[k, i]
 
 
-@njit(cache=True)
+@kernel
 def combined(a, x, b, y, c, z, out_increment):
     """Sum a x + b y + c z of three increments (m,)."""
     for i in range(x.shape[0]):

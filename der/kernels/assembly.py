@@ -21,11 +21,11 @@ and one 3 x 3 Hessian serves all four blocks.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from der.kernels.quaternions import into_frame, relative
 from der.kernels.strain import vertex_energy
+from der.packs.kernel import kernel
 
 _BENT_TOO_FAR = 0.0301537  # cos(80 deg)^2: half-angle limit, turning or twist beyond 160 degrees
 
@@ -47,7 +47,7 @@ class System(NamedTuple):
     bent_too_far: int  # first vertex that turns or twists by more than 160 degrees; -1: none
 
 
-@njit(cache=True)
+@kernel
 def position_rows(length, weight, axis, quat, stretch, out_sum, out_border):
     """Weighted sums of the edge vectors along axes, added to ``out_sum``, and their derivatives.
 
@@ -72,7 +72,7 @@ def position_rows(length, weight, axis, quat, stretch, out_sum, out_border):
                 out_border[j, 3, k] = w * length[j] * d[2]
 
 
-@njit(cache=True)
+@kernel
 def lengthened(rod, held, stretch, load):
     """Strains (n,) that make edges as long as they are: their own, and what the load adds."""
     strain = stretch.copy()
@@ -82,7 +82,7 @@ def lengthened(rod, held, stretch, load):
     return strain
 
 
-@njit(cache=True)
+@kernel
 def assemble(rod, held, quat, stretch, force, load):
     """Derivatives of the Lagrangian; see `System`, `rod.Rod`, `supports.Supports`."""
     n, b = held.free.shape
@@ -228,7 +228,7 @@ def assemble(rod, held, quat, stretch, force, load):
     )
 
 
-@njit(cache=True)
+@kernel
 def _relative_rotation(p, out_R):
     """Rotation matrix of ``p`` (4,), of any norm."""
     q0, q1, q2, q3 = p[0], p[1], p[2], p[3]
@@ -244,7 +244,7 @@ def _relative_rotation(p, out_R):
     out_R[2, 2] = (q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3) * scale
 
 
-@njit(cache=True)
+@kernel
 def take_out(free, diag, off, border):
     """Copies of Hessian blocks and border with the unknowns that are not ``free`` (n, b) taken out.
 
@@ -255,7 +255,7 @@ def take_out(free, diag, off, border):
     return diag, off, border
 
 
-@njit(cache=True)
+@kernel
 def hold(free, out_diag, out_off, out_border):
     """`take_out` in place."""
     n, b = free.shape

@@ -25,10 +25,10 @@ SciPy has banded Cholesky and LU, but no symmetric-indefinite band solver that t
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from der.kernels.dense import invert, invert_one, invert_three, solve_dense
+from der.packs.kernel import kernel
 
 MAX_DELAYED = 8
 
@@ -49,7 +49,7 @@ class Factors(NamedTuple):
     negative: int  # negative pivots of T
 
 
-@njit(cache=True)
+@kernel
 def _own_stiffness(diag, off, out_size):
     """Diagonal entries (n, b), in size, or what stands in for them; returns the largest entry.
 
@@ -72,7 +72,7 @@ def _own_stiffness(diag, off, out_size):
     return whole
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _reduce(b, j, diag, off, inverse, unit, out_lower, out_pivot):
     """The block of L before pivot ``j``, and this pivot (b, b) in the units of its unknowns."""
     for k in range(b):
@@ -97,7 +97,7 @@ def _reduce(b, j, diag, off, inverse, unit, out_lower, out_pivot):
             out_pivot[k, i] *= unit[k] * unit[i]
 
 
-@njit(cache=True)
+@kernel
 def factor(diag, off, border):
     """Factor K; see `Factors`. ``negative`` is -1 where too many pivots had to be delayed.
 
@@ -173,7 +173,7 @@ def factor(diag, off, border):
     return Factors(inverse, lower, wide, lifted, schur, magnitude, negative)
 
 
-@njit(cache=True)
+@kernel
 def solve_band(inverse, lower, x):
     """Replace ``x`` (n, b, r), r right-hand sides, by (T + delayed)^-1 x."""
     b = x.shape[1]
@@ -185,7 +185,7 @@ def solve_band(inverse, lower, x):
         _sweep(b, inverse, lower, x)
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _sweep(b, inverse, lower, x):
     """`solve_band`, forward and back."""
     n, _, r = x.shape
@@ -211,7 +211,7 @@ def _sweep(b, inverse, lower, x):
                 x[j, k, c] = y[k, c]
 
 
-@njit(cache=True)
+@kernel
 def inertia(factors):
     """Number of negative eigenvalues of K, and how safe that is: smallest scaled border pivot.
 
@@ -232,7 +232,7 @@ def inertia(factors):
     return factors.negative + minus, smallest
 
 
-@njit(cache=True)
+@kernel
 def solve(factors, x):
     """Replace ``x`` (n, b, r) by K^-1 x, the border's own entries zero. False: K is singular."""
     n, b, r = x.shape
@@ -254,7 +254,7 @@ def solve(factors, x):
     return True
 
 
-@njit(cache=True)
+@kernel
 def solve_augmented(factors, m, column, column_border, row, row_border, corner, x, y, z):
     """Solve K with one more column and one more, unsymmetric, row, such as an arclength condition.
 
@@ -327,7 +327,7 @@ def solve_augmented(factors, m, column, column_border, row, row_border, corner, 
     return True
 
 
-@njit(cache=True)
+@kernel
 def solve_refined(diag, off, factors, m, column, column_border, row, row_border, corner, x, y, z):
     """`solve_augmented` with its residual checked, and refined once where that is not tiny.
 
@@ -374,7 +374,7 @@ def solve_refined(diag, off, factors, m, column, column_border, row, row_border,
     return error < 1e-6
 
 
-@njit(cache=True)
+@kernel
 def _subtract(
     diag, off, border, column, column_border, row, row_border, corner, x, y, z, out_x, out_y, out_z
 ):

@@ -4,12 +4,13 @@ They have few rows: a call of LAPACK would take longer than the arithmetic.
 """
 
 import numpy as np
-from numba import njit
+
+from der.packs.kernel import kernel
 
 _BUNCH_PARLETT = 0.6403882032022076  # (1 + sqrt 17)/8, Bunch & Parlett 1971
 
 
-@njit(cache=True)
+@kernel
 def invert(A, delay_below, out_delayed):
     """Replace the symmetric ``A`` (m, m) by -A^-1, by sweeps with complete pivoting.
 
@@ -88,7 +89,7 @@ def invert(A, delay_below, out_delayed):
     return negative, smallest
 
 
-@njit(cache=True)
+@kernel
 def invert_one(A, smallest):
     """`invert` of a single entry (1, 1) above ``smallest``; else -1, with ``A`` as it was."""
     a = A[0, 0]
@@ -98,7 +99,7 @@ def invert_one(A, smallest):
     return int(a < 0.0)
 
 
-@njit(cache=True)
+@kernel
 def invert_three(A, smallest):
     """`invert` of a matrix (3, 3) by formula, with its pivots in order, where they allow that.
 
@@ -132,7 +133,7 @@ def invert_three(A, smallest):
     return int(a < 0.0) + int(d < 0.0) + int(f < 0.0)
 
 
-@njit(cache=True)
+@kernel
 def solve_dense(A, x):
     """Replace ``x`` (m, r) by A^-1 x; Gaussian elimination with partial pivoting, destroys A.
 

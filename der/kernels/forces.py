@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from der.kernels.assembly import lengthened, position_rows
 from der.kernels.quaternions import Array, into_frame, relative
 from der.kernels.strain import vertex_energy
+from der.packs.kernel import kernel
 
 _BENT_TOO_FAR = 0.0301537  # cos(80 deg)^2, as in assembly.py
 
@@ -43,7 +43,7 @@ class Pull(NamedTuple):
     work: Array  # (1,) of the dead load
 
 
-@njit(cache=True)
+@kernel
 def vertex_gradient(p, measure, rest, stiffness, out_kappa, out_g, out_H):
     """Elastic energy of one vertex and its gradient, as `strain.vertex_energy` without Hessian.
 
@@ -74,7 +74,7 @@ def vertex_gradient(p, measure, rest, stiffness, out_kappa, out_g, out_H):
     return energy
 
 
-@njit(cache=True)
+@kernel
 def gradient(rod, held, motion, out_pull):
     """Elastic energy, first vertex bent too far (or -1); forces and conditions to ``out_pull``.
 
@@ -109,7 +109,7 @@ def gradient(rod, held, motion, out_pull):
     return energy, bent_too_far
 
 
-@njit(cache=True)
+@kernel
 def conditions(rod, held, motion, out_pull):
     """Gaps of the position conditions and their derivatives, along the load too."""
     m = out_pull.gap.shape[0]
@@ -138,7 +138,7 @@ def conditions(rod, held, motion, out_pull):
                 out_pull.load_border[k] += held.weight[k, j] * held.reach[j] * v[2]
 
 
-@njit(cache=True)
+@kernel
 def _edge_forces(rod, held, motion, out_pull):
     """Energy of stretching; its forces and those of the dead load, and the force on the load."""
     n, b = out_pull.grad.shape
@@ -163,7 +163,7 @@ def _edge_forces(rod, held, motion, out_pull):
     return energy
 
 
-@njit(cache=True)
+@kernel
 def clear(out_rows):
     """Zero everywhere: loops, since assigning to a slice takes numba a second to compile."""
     n, b = out_rows.shape

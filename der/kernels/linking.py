@@ -7,14 +7,14 @@ another, which is how self-crossings of the ideal ring are found.
 """
 
 import numpy as np
-from numba import njit
 
 from der.kernels.quaternions import Array, relative, tangent
+from der.packs.kernel import kernel
 
 _THIN = 0.1  # of 16: the size of the product of complex numbers below which digits are lost
 
 
-@njit(cache=True)
+@kernel
 def twist(quat):
     """Total twist (turns) of the closed ribbon with edge frames ``quat`` (n, 4)."""
     n = quat.shape[0]
@@ -26,7 +26,7 @@ def twist(quat):
     return total / np.pi
 
 
-@njit(cache=True)
+@kernel
 def writhe(x, copies):
     """Writhe of the closed polygon with vertices ``x`` (n, 3): Klenin & Langowski 2000, method 1a.
 
@@ -58,7 +58,7 @@ def writhe(x, copies):
     return copies * total / (4.0 * np.pi)
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _solid_angles(x, i, first, last):
     """Sum of the signed areas, on the sphere, of the directions from edge ``i`` to a run of edges.
 
@@ -112,7 +112,7 @@ def _solid_angles(x, i, first, last):
     return -2.0 * (total + np.arctan2(imaginary, real))
 
 
-@njit(cache=True)
+@kernel
 def _quadrilateral(p, q, r, s):
     """Signed area, on the sphere, of the directions from the edge pq to the edge rs.
 
@@ -146,7 +146,7 @@ def _quadrilateral(p, q, r, s):
     return area * np.sign(triple)
 
 
-@njit(cache=True)
+@kernel
 def unfold(quat, copies):
     """Frames (N, 4) of the full ring from those of a sector, from the first grip on.
 
@@ -172,7 +172,7 @@ def unfold(quat, copies):
     return out
 
 
-@njit(cache=True)
+@kernel
 def unfold_lengths(length, copies):
     """Edge lengths (N,) of the full ring from those (n,) of a sector, which ends in half edges."""
     n = length.shape[0]
@@ -190,7 +190,7 @@ def unfold_lengths(length, copies):
     return out
 
 
-@njit(cache=True)
+@kernel
 def vertices(quat, length):
     """Vertices (N, 3) of the closed ring with these edges; the origin is midway between the grips.
 
@@ -215,7 +215,7 @@ def vertices(quat, length):
     return x
 
 
-@njit(cache=True)
+@kernel
 def link_number(quat, length, copies):
     """Tw + Wr of the ring made of ``copies`` of a sector with frames (n, 4) and lengths (n,)."""
     whole = unfold(quat, copies)

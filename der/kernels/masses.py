@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from der.kernels.forces import clear
 from der.kernels.quaternions import Array, into_frame, relative
+from der.packs.kernel import kernel
 
 
 class Masses(NamedTuple):
@@ -24,7 +24,7 @@ class Masses(NamedTuple):
     of_load: Array  # (1,) inverse mass of the load, 0 where it is given
 
 
-@njit(cache=True)
+@kernel
 def weigh(rod, held, motion, heaviness, frees_load, out_masses):
     """Inverse masses for the present configuration: ``heaviness`` times the vertex stiffnesses."""
     n, b = held.free.shape
@@ -60,7 +60,7 @@ def weigh(rod, held, motion, heaviness, frees_load, out_masses):
     out_masses.of_load[0] = 1.0 / of_load if frees_load and of_load > 0.0 else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _vertex_masses(p, stiffness, out_first, out_second):
     """Stiffness (3,) of a vertex, in the frame half way, seen in its two edges' frames (3, 3)."""
     half = np.empty(4)
@@ -80,7 +80,7 @@ def _vertex_masses(p, stiffness, out_first, out_second):
                 out_second[i, j] += stiffness[k] * R[k, i] * R[k, j]
 
 
-@njit(cache=True)
+@kernel
 def _invert(mass, free, out_inverse):
     """Inverse of ``mass`` (3, 3) on the entries that are free; the rest 0."""
     a = mass.copy()
@@ -103,7 +103,7 @@ def _invert(mass, free, out_inverse):
             out_inverse[i, j] *= scale if free[i] and free[j] else 0.0
 
 
-@njit(cache=True)
+@kernel
 def condition_metric(masses, pull):
     """Fill ``lever`` = M^-1 B and ``metric``, the Cholesky factor of B' M^-1 B."""
     n, b, m = pull.border.shape
@@ -127,7 +127,7 @@ def condition_metric(masses, pull):
             metric[k, i] = np.sqrt(metric[k, i]) if i == k else metric[k, i] / metric[i, i]
 
 
-@njit(cache=True)
+@kernel
 def solve_metric(metric, y):
     """Solve, in place, for the multipliers ``y`` (m,) with the factor of `condition_metric`."""
     m = y.shape[0]

@@ -21,10 +21,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from der.kernels.block_ldl import factor, inertia, solve_refined
+from der.packs.kernel import kernel
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class PlanarSystem(NamedTuple):
     bent: int  # first vertex bent too far; -1: none
 
 
-@njit(cache=True)
+@kernel
 def assemble_planar(rod, phi, force, load):
     """Derivatives of the Lagrangian at the angles ``phi`` (n,), ``force`` (2 n_g,) and ``load``."""
     n, n_s = rod.length.shape[0], rod.rest.shape[0]
@@ -142,7 +142,7 @@ def assemble_planar(rod, phi, force, load):
     )
 
 
-@njit(cache=True)
+@kernel
 def _largest(values):
     """Largest entry, in size, or NaN."""
     largest = 0.0
@@ -152,7 +152,7 @@ def _largest(values):
     return largest
 
 
-@njit(cache=True)
+@kernel
 def correct_planar(rod, phi, force, load, directed, row, row_load, pin, tolerance, most):
     """Newton's method, the load given, or, ``directed``, corrections orthogonal to a direction.
 
@@ -270,7 +270,7 @@ def correct_planar(rod, phi, force, load, directed, row, row_load, pin, toleranc
     )
 
 
-@njit(cache=True)
+@kernel
 def negative_planar(rod, phi, force, load, shift):
     """Negative eigenvalues of the bordered Hessian with ``shift`` length_j added; -1: unknown."""
     system = assemble_planar(rod, phi, force, load)

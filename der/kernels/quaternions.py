@@ -9,13 +9,14 @@ Bergou et al. 2010), w3 is the increment of the material angle theta.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from der.packs.kernel import kernel
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel
 def turned(q, w, out_q):
     """Frame ``q`` (4,) turned by the rotation vector ``w`` (3,) [rad] given in the frame itself."""
     angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
@@ -31,7 +32,7 @@ def turned(q, w, out_q):
     out_q[0], out_q[1], out_q[2], out_q[3] = p0 * scale, p1 * scale, p2 * scale, p3 * scale
 
 
-@njit(cache=True)
+@kernel
 def relative(qa, qb, out_p):
     """Rotation from frame ``qa`` to frame ``qb``, as seen in ``qa``: conj(qa) o qb, (4,)."""
     out_p[0] = qa[0] * qb[0] + qa[1] * qb[1] + qa[2] * qb[2] + qa[3] * qb[3]
@@ -40,7 +41,7 @@ def relative(qa, qb, out_p):
     out_p[3] = qa[0] * qb[3] - qa[1] * qb[2] + qa[2] * qb[1] - qa[3] * qb[0]
 
 
-@njit(cache=True)
+@kernel
 def into_frame(q, a, out_b):
     """Components (a . d1, a . d2, a . d3) of the global vector ``a`` (3,) in the frame ``q``."""
     q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
@@ -62,7 +63,7 @@ def into_frame(q, a, out_b):
     )
 
 
-@njit(cache=True)
+@kernel
 def tangent(q, out_d3):
     """Tangent d3 (3,) of the frame ``q`` (4,), in the global basis."""
     out_d3[0] = 2.0 * (q[1] * q[3] + q[0] * q[2])
@@ -81,7 +82,7 @@ def rotation(quat: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-@njit(cache=True)
+@kernel
 def rotation_vector(qa, qb):
     """Rotation vectors (n, 3) [rad], in the frames ``qa`` (n, 4), that turn these into ``qb``."""
     n = qa.shape[0]
@@ -101,7 +102,7 @@ def rotation_vector(qa, qb):
     return w
 
 
-@njit(cache=True)
+@kernel
 def chart_rate(w, omega):
     """Rates (n, 3) of rotation vectors ``w`` (n, 3) of frames that turn at the rates ``omega``.
 

@@ -21,12 +21,13 @@ All are second order in the cell length; `der bench` shows which is most accurat
 """
 
 import numpy as np
-from numba import njit
+
+from der.packs.kernel import kernel
 
 _SERIES_BELOW = 0.03  # 10 terms reach 1e-16 here, and f'' still has 13 digits above it
 
 
-@njit(cache=True)
+@kernel
 def arctangent_quotient(r):
     """f = 2 arctan(sqrt r)/sqrt r and its first two derivatives in r = tan(angle/2)^2."""
     if r < _SERIES_BELOW:
@@ -43,7 +44,7 @@ def arctangent_quotient(r):
     return f, f1, f2
 
 
-@njit(cache=True)
+@kernel
 def _split_energy(p, tangent, rest, stiffness, out_kappa, out_g, out_H):
     """`vertex_energy` for the measures "angle" and "tangent", bend and twist apart.
 
@@ -125,7 +126,7 @@ def _split_energy(p, tangent, rest, stiffness, out_kappa, out_g, out_H):
     return energy
 
 
-@njit(cache=True)
+@kernel
 def _arc_coefficient(t):
     """c = (1 - x cot x)/t with x = sqrt(t)/2, and dc/dt, at the squared angle ``t`` [rad^2].
 
@@ -156,7 +157,7 @@ def _arc_coefficient(t):
     return value, rate
 
 
-@njit(cache=True)
+@kernel
 def _rotation_vector_energy(p, rest, stiffness, out_kappa, out_g, out_H):
     """`vertex_energy` for the measure "logarithm".
 
@@ -207,7 +208,7 @@ def _rotation_vector_energy(p, rest, stiffness, out_kappa, out_g, out_H):
     return 0.5 * (mx * dx + my * dy + mz * dz)
 
 
-@njit(cache=True)
+@kernel
 def vertex_energy(p, measure, rest, stiffness, out_kappa, out_g, out_H):
     """Elastic energy of one vertex and its derivatives in the frame of the second edge.
 

@@ -8,12 +8,13 @@ smoothly through zero where one strand passes through the other.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from der.packs.kernel import kernel
 
 _TURN = 3.0  # rad; an arc has to turn by pi to meet itself (Fenchel)
 
 
-@njit(cache=True)
+@kernel
 def nearest_strands(x, y):
     """Vertices (i, k) of two strands that are closest on the straight line from ``x`` to ``y``.
 
@@ -54,7 +55,7 @@ def nearest_strands(x, y):
     return at_i, at_k
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _edges_apart(x, i, k):
     """Squared distance of edges ``i`` and ``k``, and their triple product (Ericson 2005, 5.1.9)."""
     n = x.shape[0]
@@ -80,7 +81,7 @@ def _edges_apart(x, i, k):
     return square, triple
 
 
-@njit(cache=True)
+@kernel
 def gap(x, i, k):
     """Signed distance of two strands of the polygon ``x`` (n, 3) near its edges ``i`` and ``k``.
 

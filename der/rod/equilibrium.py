@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from der.errors import REASONS
 from der.kernels.assembly import assemble, hold
 from der.kernels.block_ldl import factor, inertia, solve_refined
 from der.kernels.quaternions import rotation_vector
+from der.packs.kernel import kernel
 from der.problem import Increment, LoadedSolution
 from der.rod.manifold import move
 from der.rod.rod import Rod, State
@@ -48,7 +48,7 @@ class Equilibrium(LoadedSolution[State]):
         return self.moment_rate / rate if rate != 0.0 else np.inf
 
 
-@njit(cache=True)
+@kernel
 def newton(
     cell, length, mass, rest, stiffness, stretching, measure, closed,
     free, weight, axis, target, turn, turn_axis, pull, reach,
@@ -159,7 +159,7 @@ def newton(
     return (quat, stretch, force, load), change, values, ends, (w, rest)
 
 
-@njit(cache=True)
+@kernel
 def _step_so_far(free, begin_quat, begin_stretch, quat, stretch, out_w):
     """Rotation vectors and stretches of the free unknowns since the begin of a step in time."""
     turns = rotation_vector(begin_quat, quat)
@@ -170,7 +170,7 @@ def _step_so_far(free, begin_quat, begin_stretch, quat, stretch, out_w):
                 out_w[j * b + i] = turns[j, i] if i < 3 else stretch[j] - begin_stretch[j]
 
 
-@njit(cache=True)
+@kernel
 def _add_inertia(free, masses, known, shift, w, out_grad, out_diag):
     """Add the forces of inertia M (known + shift w) to the gradient, and shift M to the Hessian."""
     n, b = free.shape
@@ -182,7 +182,7 @@ def _add_inertia(free, masses, known, shift, w, out_grad, out_diag):
                 out_diag[j, i, i] += masses[k] * shift
 
 
-@njit(cache=True)
+@kernel
 def _residual(held, system, control, moment):
     """Largest entry of the gradient that is free to vanish, of the position gaps and the moment."""
     largest = 0.0
@@ -198,7 +198,7 @@ def _residual(held, system, control, moment):
     return largest
 
 
-@njit(cache=True)
+@kernel
 def _normalise(rod, system, column, x, y, z):
     """Scale a tangent (n, b), (n_c,), (1,) in place to unit norm; returns d(dL/dload) along it."""
     n, b = x.shape

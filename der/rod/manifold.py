@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from der.kernels.quaternions import Array, chart_rate, into_frame, rotation_vector, turned
+from der.packs.kernel import kernel
 from der.problem import Increment
 from der.rod.rod import State
 from der.rod.supports import Supports
@@ -37,7 +37,7 @@ def split(supports: Supports, increment: Increment) -> Direction:
     return Direction(q, increment[size:-1], float(increment[-1]))
 
 
-@njit(cache=True)
+@kernel
 def product(weight, a, b):
     """Inner product of two increments (m,): mass-weighted rotations and stretches, and the load."""
     total = 0.0
@@ -46,7 +46,7 @@ def product(weight, a, b):
     return total
 
 
-@njit(cache=True)
+@kernel
 def difference(free, quat, stretch, force, load, next_quat, next_stretch, next_force, next_load):
     """Increment (m,) that leads from one configuration to the next."""
     n, b = free.shape
@@ -63,7 +63,7 @@ def difference(free, quat, stretch, force, load, next_quat, next_stretch, next_f
     return jump
 
 
-@njit(cache=True)
+@kernel
 def transport(n, b, jump, rates):
     """Rates (m,) at the end of an increment, in the frames of its start."""
     own = rates.copy()
@@ -74,7 +74,7 @@ def transport(n, b, jump, rates):
     return own
 
 
-@njit(cache=True)
+@kernel
 def move(turn, turn_axis, quat, stretch, force, increment):
     """Add an increment (m,) to frames (n, 4), stretch (n,) and forces (n_c,), in place.
 
@@ -98,7 +98,7 @@ def move(turn, turn_axis, quat, stretch, force, increment):
         force[k] += increment[n * b + k]
 
 
-@njit(cache=True)
+@kernel
 def _retract(turn, turn_axis, quat, stretch, force, increment):
     quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
     move(turn, turn_axis, quat, stretch, force, increment)

@@ -23,11 +23,11 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from der.kernels.forces import Motion, Pull, clear, conditions, gradient
 from der.kernels.masses import Masses, condition_metric, solve_metric, weigh
 from der.kernels.quaternions import Array, into_frame, turned
+from der.packs.kernel import kernel
 from der.problem import Increment
 from der.rod.rod import State
 from der.rod.supports import Supports
@@ -116,7 +116,7 @@ class Relaxed(MotionEnd):
     restarts: int  # from rest, at peaks of the kinetic energy
 
 
-@njit(cache=True)
+@kernel
 def _balance(supports, masses, aim, pull):
     """Add the forces that keep accelerations on the conditions; returns the largest residual.
 
@@ -146,7 +146,7 @@ def _balance(supports, masses, aim, pull):
     return largest
 
 
-@njit(cache=True)
+@kernel
 def _accelerate(pull, masses, moment, time, motion):
     """Kinetic energy after ``time`` steps of acceleration, with the velocity on the conditions.
 
@@ -180,7 +180,7 @@ def _accelerate(pull, masses, moment, time, motion):
     return kinetic
 
 
-@njit(cache=True)
+@kernel
 def _go(supports, time, velocity, rate, motion):
     """Move for ``time`` steps at a velocity."""
     n, b = velocity.shape
@@ -199,13 +199,13 @@ def _go(supports, time, velocity, rate, motion):
     motion.load[0] += time * rate[0]
 
 
-@njit(cache=True)
+@kernel
 def _stop(motion):
     clear(motion.velocity)
     motion.rate[0] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def _close(rod, supports, masses, pull, motion):
     """Move the rod onto its conditions, from rest to rest, by projections in the mass metric."""
     for _ in range(_PROJECTIONS):
@@ -223,7 +223,7 @@ def _close(rod, supports, masses, pull, motion):
         _stop(motion)
 
 
-@njit(cache=True)
+@kernel
 def _verdict(aim, residual, first, kinetic, load, bent_too_far, count):
     """Value of `Rest` where the motion ends here; -1: it goes on."""
     if not np.isfinite(residual) or residual > 1e3 * max(first, 1.0):
@@ -237,7 +237,7 @@ def _verdict(aim, residual, first, kinetic, load, bent_too_far, count):
     return 1 if count >= aim.most else -1
 
 
-@njit(cache=True)
+@kernel
 def _keep(motion, energy, slot, out_album):
     """Copy a configuration to its place in the album."""
     for j in range(motion.stretch.shape[0]):
@@ -248,7 +248,7 @@ def _keep(motion, energy, slot, out_album):
     out_album.energy[slot] = energy
 
 
-@njit(cache=True)
+@kernel
 def _thin(out_album):
     """Keep every second configuration; returns how many."""
     kept = (out_album.load.shape[0] + 1) // 2
@@ -260,7 +260,7 @@ def _thin(out_album):
     return kept
 
 
-@njit(cache=True)
+@kernel
 def _potential(energy, aim, motion, pull):
     """Potential energy: elastic, less the work of dead loads; gaps count to first order."""
     potential = energy - pull.work[0] - aim.moment * motion.load[0]
@@ -269,7 +269,7 @@ def _potential(energy, aim, motion, pull):
     return potential
 
 
-@njit(cache=True)
+@kernel
 def _relax(rod, supports, aim, motion, pull, masses, album):
     """Motion with kinetic damping until it ends; writes to all that follows ``aim``."""
     heaviness, kinetic, at_rest = 0.5 * _MARGIN, 0.0, 0.0

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from der.kernels.assembly import assemble, lengthened, position_rows, take_out
 from der.kernels.block_ldl import factor, inertia, solve, solve_refined
 from der.kernels.quaternions import Array
+from der.packs.kernel import kernel
 from der.problem import Indices, Softest
 from der.rod.rod import Rod, State
 from der.rod.supports import Supports, check_cut
@@ -82,7 +82,7 @@ def start_vectors(modes: SymmetryClass) -> Array:
     return np.array(found)
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _class_matrix(rod, supports, system, free, weight, axis, quat, stretch, load):
     """Blocks and border of the Hessian at a state of ``supports``, for the modes of one class."""
     n, b = supports.free.shape
@@ -93,7 +93,7 @@ def _class_matrix(rod, supports, system, free, weight, axis, quat, stretch, load
     return take_out(free, system.diag, system.off, border)
 
 
-@njit(cache=True)
+@kernel
 def _stiffness(length, factors, x):
     """Estimate of the eigenvalue nearest to zero, by `_ROUNDS` of inverse iteration of ``x``.
 
@@ -121,7 +121,7 @@ def _stiffness(length, factors, x):
     return 1.0 / largest if largest != 0.0 else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _orthonormalise(length, out_x):
     """Make the two columns of (n, b, 2) orthonormal in the product with the edges' lengths."""
     n, b, _ = out_x.shape
@@ -143,7 +143,7 @@ def _orthonormalise(length, out_x):
             out_x[j, i, 1] *= other
 
 
-@njit(cache=True)
+@kernel
 def _counts(
     cell, length, mass, rest, bending, stretching, measure, closed,
     free, weight, axis, target, turn, turn_axis, pull, reach,
@@ -233,7 +233,7 @@ def all_modes(supports: Supports) -> SymmetryClass:
     return SymmetryClass(supports.free, supports.weight, supports.axis)
 
 
-@njit(cache=True)
+@kernel
 def _solve_class(rod, supports, modes, quat, stretch, force, load, x):
     """Replace ``x`` (n, b, r) by the displacements under it as forces, on the conditions."""
     system = assemble(rod, supports, quat, stretch, force, load)

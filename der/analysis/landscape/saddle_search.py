@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from der.kernels.assembly import assemble, take_out
 from der.kernels.block_ldl import factor, solve_refined
 from der.kernels.quaternions import Array
+from der.packs.kernel import kernel
 from der.rod.equilibrium import Equilibrium
 from der.rod.free_ring import FreeRing, balance
 from der.rod.system import RodSystem
@@ -98,7 +98,7 @@ def _turned(
     return step * min(1.0, _LONGEST / max(size, 1e-300))
 
 
-@njit(cache=True)
+@kernel
 def _system(rod, supports, quat, stretch, force):
     """Newton's step (n, b, 1) at fixed load, the gradient, and whether the matrix is regular."""
     system = assemble(rod, supports, quat, stretch, force, 0.0)

@@ -16,13 +16,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from der.bvp.collocation import Collocation
 from der.bvp.condensing import forward, workspace
 from der.bvp.corrector import border, move
 from der.bvp.gauss import Array
 from der.bvp.meshes import Mesh
+from der.packs.kernel import kernel
 
 DIFFERENCE = 1e-5  # of p and gamma
 SHOT = 1e-13  # last change of a frame
@@ -53,7 +53,7 @@ class Centre(NamedTuple):
     bend: Array  # (n_p + 1, n_p + 1) of psi^T G by x, about
 
 
-@njit(cache=True)
+@kernel
 def _shoot(
     piece, h, rest, frames, p, gamma, iterations, tolerance, nodes, places, out_missed, out_rates
 ):
