@@ -28,6 +28,7 @@ class Reason(Enum):
     TURNED_BACK = (
         "gamma turns back before gamma_max, and the path runs to -gamma_max without arriving"
     )
+    CLOSED = "the path is closed: it has returned to its start without arriving at gamma_max"
     UNFOLDED = (
         "gamma has left -4 pi to 4 pi, and the ring has not folded at pi; "
         "a larger gamma_max goes on"

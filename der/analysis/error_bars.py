@@ -122,7 +122,7 @@ def _extrapolated(
 
 def _asked(request: Request, points: Sequence[Point[Equilibrium]]) -> set[float]:
     """Values of gamma that states were solved for [rad]."""
-    asked = {math.pi, request.gamma_max, -request.gamma_max}
+    asked = {0.0, math.pi, request.gamma_max, -request.gamma_max}
     if request.targets is not None:
         return asked | set(request.targets)
     most = math.ceil(max(abs(one.solution.parameter) for one in points) / EIGHTH)

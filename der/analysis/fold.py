@@ -82,6 +82,8 @@ def fold(
         points = run.collect(_points(scene, ring, request, statistics), tell)
         if run.done and points[-1].solution.parameter == -scene.gamma_max:
             run.note(Reason.TURNED_BACK)
+        if run.done and scene.control == "arclength" and points[-1].solution.parameter == 0.0:
+            run.note(Reason.CLOSED)
         if run.done and scene.unfolded(points[-1].solution.parameter):
             run.stop(Reason.UNFOLDED)
         found = _Found(scene, ring, points)
@@ -169,7 +171,7 @@ class _Found:
         scene, bars = self.scene, self.bars
         raw = columns(self.ring, self.points)
         at_pi, mode = self._at_pi(raw)
-        if run.reason is Reason.TURNED_BACK and at_pi is None:
+        if run.reason in (Reason.TURNED_BACK, Reason.CLOSED) and at_pi is None:
             mode = Mode(foldable=False, stable=None, snapping="snap-back", stable_3d=None)
         if scene.control == "moment":
             mode = None  # a ring that snaps under its moment passes its folds unseen

@@ -19,6 +19,7 @@ from der.scene import Scene
 # rad between tangents, if nothing is counted between states: the folds and limits of 280 rings were
 # the same as with the default
 LOOSE_TURN = 5.0 / 3.0 * Options.aimed_turn
+_SAME = 1e-6  # of s: two states that are one
 EIGHTH = math.pi / 8.0  # states are solved for at its multiples if no targets are given
 
 
@@ -56,10 +57,12 @@ class Request:
         def stop(at: Solution[State]) -> bool:
             if abs(at.parameter) == self.gamma_max:  # also of a path that has turned back for good
                 return True
+            if at.parameter == 0.0 and is_start(ring, at.state):  # of a closed path
+                return True
             return self.until_folded and at.parameter == math.pi and ring.folded(at.state)
 
         return Events(
-            targets=(*(self.targets or ()), math.pi, self.gamma_max, -self.gamma_max),
+            targets=(*(self.targets or ()), 0.0, math.pi, self.gamma_max, -self.gamma_max),
             spacing=EIGHTH if self.targets is None else 0.0,
             stop=stop,
             limits=("moment",) if self.limits else (),
@@ -82,6 +85,12 @@ class Request:
         """Yield the points of the path from the flat ring, or another state."""
         begin, events = ring.start if start is None else start, self.events(ring)
         return follow(ring, begin, events, along=along, options=self.options, statistics=statistics)
+
+
+def is_start(ring: GrippedRing, state: State) -> bool:
+    """Whether an equilibrium is that of the flat ring, where paths start."""
+    apart = ring.difference(ring.correct(ring.start).state, state)
+    return ring.inner(apart, apart) < _SAME**2
 
 
 def ring_of(scene: Scene, sector: str | None = None, n_edges: int | None = None) -> GrippedRing:

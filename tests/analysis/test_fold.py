@@ -12,7 +12,7 @@ import pytest
 import der
 import der.analysis.curve_distance
 import der.analysis.fold
-from der.analysis.request import Request
+from der.analysis.request import Request, is_start, ring_of
 from der.errors import ContinuationFailed, Reason
 
 EIGHTH = math.pi / 8
@@ -546,6 +546,34 @@ def test_a_path_that_never_arrives_is_unfoldable_and_says_so():
     assert "without arriving" in path.message
     folds = [point.gamma for point in path.folds]
     np.testing.assert_allclose(folds, [3.106268, 1.938953, 2.355590], atol=0.02)
+
+
+def test_a_closed_path_ends_at_its_start():
+    """It went round and round for 2,000 steps, and was called unfinished.
+
+    The boundary-value problem has its folds at 1.670133, 1.506996 and 1.595825, and their
+    opposites.
+    """
+    ring, section = der.circle(natural_curvature=-2.87006998), der.section(1.62150904, 1.62150904)
+    path = der.fold(der.Scene(ring, section, n_edges=128, save_at=(1.0,), self_crossings=False))
+    assert (path.status, path.reason, path.at_pi) == ("done", "closed", None)
+    assert (path.mode.foldable, path.mode.stable) == (False, None)
+    assert path.gamma[-1] == 0.0
+    assert path.energy[-1] == pytest.approx(path.energy[0], rel=1e-12)
+    assert path.moment[-1] == pytest.approx(0.0, abs=1e-9)
+    folds = [point.gamma for point in path.folds]
+    np.testing.assert_allclose(folds[:3], [1.660486, 1.506996, 1.595825], atol=0.02)
+    np.testing.assert_allclose(np.add(folds, folds[::-1]), 0.0, atol=1e-7)
+
+
+def test_the_start_of_a_path_is_known_again():
+    """Its own state on a mesh, which for a triangle is 2e-4 from the flat shape, and no other."""
+    ring = ring_of(der.Scene(der.triangle(1.2, 0.1), der.rectangular_section(4.0)))
+    start = ring.correct(ring.start)
+    assert is_start(ring, start.state)
+    beside = ring.correct(ring.retract(start.state, ring.increment(load=1e-3)))
+    assert beside.converged
+    assert not is_start(ring, beside.state)
 
 
 @pytest.mark.parametrize("stretch", ["inextensible", "finite"])

@@ -65,6 +65,8 @@ def _end(scene: Scene, path: Path) -> Iterator[Fault]:
     expected = {0.0} if scene.unload else {scene.gamma_max}
     if path.reason == Reason.TURNED_BACK.word:
         expected = {-scene.gamma_max}
+    elif path.reason == Reason.CLOSED.word:
+        expected = {0.0}
     elif scene.until == "folded":
         expected |= {math.pi, -math.pi}
     if last not in expected:

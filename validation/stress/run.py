@@ -63,7 +63,13 @@ EXPLAINED = frozenset(
     }
 )
 NOT_EXPLAINED = frozenset(
-    {Reason.CONVERGED, Reason.TURNED_BACK, Reason.INTERRUPTED, Reason.FOLD_NEAR_PI}
+    {
+        Reason.CONVERGED,
+        Reason.TURNED_BACK,
+        Reason.CLOSED,
+        Reason.INTERRUPTED,
+        Reason.FOLD_NEAR_PI,
+    }
 )
 _EXPLAINED_NAMES = {REFUSED, *(not_converged(reason.word) for reason in EXPLAINED)}
 
