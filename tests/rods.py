@@ -1,18 +1,21 @@
 """Rods, states and small numerics that the physics tests share."""
 
+from collections import namedtuple
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
 
-from der.kernels.assembly import assemble
+from der.kernels.assembly import System
+from der.kernels.assembly import derivatives as assembled
 from der.kernels.linking import unfold
 from der.kernels.quaternions import Array, rotation, turned
 from der.problem import PLANE
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing
 from der.rod.rod import Rod, State, discrete_rod
-from der.rod.stability import all_modes, raw_index
+from der.rod.stability import all_modes, raw_index, stack
+from der.rod.supports import Supports
 from der.rod.system import RodSystem
 
 E1, E2, E3 = np.eye(3)
@@ -102,6 +105,20 @@ def three_covered(ring: GrippedRing) -> State:
     return ring.start.but(quat=quat, load=np.pi)
 
 
+Derivatives = namedtuple(
+    "Derivatives",
+    (*System._fields, "energy", "load_grad", "load_hess", "noise", "bent_too_far"),
+)
+
+
+def derivatives(rod: Rod, supports: Supports, state: State) -> Derivatives:
+    """Lagrangian's derivatives at a state, and the numbers that come with them."""
+    found, numbers = assembled(
+        rod, supports, state.quat, state.stretch, state.force, float(state.load)
+    )
+    return Derivatives(*found, *numbers)
+
+
 # --- numerics -------------------------------------------------------------------------------
 
 
@@ -115,7 +132,8 @@ def richardson(*values: float) -> float:
 
 def index_of(system: RodSystem, state: State) -> int:
     """Index of a state on all that its supports leave free, by the engine's factorisation."""
-    return raw_index(system.rod, system.supports, all_modes(system.supports), state)
+    alone = stack([all_modes(system.supports)], system.work)
+    return raw_index(system.rod, system.supports, alone, state)
 
 
 def first_change(index: Callable[[float], int], low: float, high: float) -> float:
@@ -135,7 +153,7 @@ def dense(system: RodSystem, state: State, *, load_free: bool = False) -> tuple[
     With ``load_free`` the load is one more unknown, the last.
     """
     rod, free = system.rod, system.supports.free
-    found = assemble(rod, system.supports, state.quat, state.stretch, state.force, state.load)
+    found = derivatives(rod, system.supports, state)
     n, b = free.shape
     hess = np.zeros((n, b, n, b))
     for j in range(n):

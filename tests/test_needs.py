@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import der
-from der.kernels.assembly import assemble
+from der.kernels.assembly import derivatives
 from der.kernels.planar import assemble_planar
 from der.rod.gripped_ring import gripped_ring
 from der.rod.planar_ring import covered, planar_ring
@@ -117,7 +117,7 @@ def test_stretch_takes_unknowns_only_where_it_is_finite(stretching, block):
     """Three unknowns an edge, and four where the edges stretch: blocks of that size."""
     ring = gripped_ring(der.circle(), der.rectangular_section(4.0), 16, stretching=stretching)
     state = ring.start
-    system = assemble(ring.rod, ring.supports, state.quat, state.stretch, state.force, state.load)
+    system, _ = derivatives(ring.rod, ring.supports, *state)
     assert system.diag.shape[1:] == (block, block)
     assert len(system.diag) < 8  # of a quarter, not of the ring
 
@@ -194,12 +194,11 @@ def test_a_planar_scene_allocates_one_unknown_an_edge():
     """What it asks for at most is less than half of what the rod in space does, at equal edges."""
     in_grips = gripped_ring(der.circle(), der.rectangular_section(4.0), 1024, name="full")
     state = in_grips.start
-    given = (state.quat, state.stretch, state.force, state.load)
     in_its_plane = planar_ring(der.Scene(der.circle(), der.rectangular_section(4.0), n_edges=1024))
     rod, phi = in_its_plane.rod(1), covered(in_its_plane, 1)
 
     def in_space():
-        assemble(in_grips.rod, in_grips.supports, *given)
+        derivatives(in_grips.rod, in_grips.supports, *state)
 
     def in_plane():
         assemble_planar(rod, phi, np.zeros(2), 0.0)

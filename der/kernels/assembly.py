@@ -18,50 +18,61 @@ R = rotation(p). With g and H the gradient and Hessian in the second edge's fram
 and one 3 x 3 Hessian serves all four blocks.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from der.kernels.quaternions import into_frame, relative
+from der.kernels.quaternions import Array, into_frame, relative
 from der.kernels.strain import vertex_energy
+from der.kernels.workspace import blocks, rows
 from der.packs.kernel import kernel
 
 _BENT_TOO_FAR = 0.0301537  # cos(80 deg)^2: half-angle limit, turning or twist beyond 160 degrees
 
 
 class System(NamedTuple):
-    """Derivatives of the Lagrangian at a state; unknowns that are held are *not* yet taken out."""
+    """Derivatives of the Lagrangian at a state; unknowns that are held are *not* yet taken out.
 
-    energy: float  # elastic energy
-    grad: NDArray[np.float64]  # (n, b) dL/dq
-    diag: NDArray[np.float64]  # (n, b, b) Hessian blocks
-    off: NDArray[np.float64]  # (n, b, b) blocks (s, s+1); the closing one of a ring stands last
-    gap: NDArray[np.float64]  # (n_c,) position conditions, 0 where they are met
-    border: NDArray[np.float64]  # (n, b, n_c) their derivatives
-    load_column: NDArray[np.float64]  # (n, b) d2L/dq dload
-    load_border: NDArray[np.float64]  # (n_c,) d gap/dload
-    load_grad: float  # dL/dload: the generalised force that does work on the load
-    load_hess: float  # d2L/dload2
-    noise: float  # rounding error of an entry of grad, estimated
-    bent_too_far: int  # first vertex that turns or twists by more than 160 degrees; -1: none
+    Kernels write to it.
+    """
+
+    grad: Array  # (n, b) dL/dq
+    diag: Array  # (n, b, b) Hessian blocks
+    off: Array  # (n, b, b) blocks (s, s+1); the closing one of a ring stands last
+    gap: Array  # (n_c,) position conditions, 0 where they are met
+    border: Array  # (n, b, n_c) their derivatives
+    load_column: Array  # (n, b) d2L/dq dload
+    load_border: Array  # (n_c,) d gap/dload
 
 
 @kernel
-def position_rows(length, weight, axis, quat, stretch, out_sum, out_border):
+def system_of(work, n, b, n_c):
+    """A `System` in ``work``, and what is left of that."""
+    grad, work = rows(work, n, b)
+    diag, work = blocks(work, n, b, b)
+    off, work = blocks(work, n, b, b)
+    border, work = blocks(work, n, b, n_c)
+    column, work = rows(work, n, b)
+    return System(grad, diag, off, np.empty(n_c), border, column, np.empty(n_c)), work
+
+
+@kernel
+def position_rows(rod, held, weight, axis, quat, stretch, load, out_sum, out_border):
     """Weighted sums of the edge vectors along axes, added to ``out_sum``, and their derivatives.
 
     Parameters
     ----------
-    length, stretch : (n,). quat : (n, 4). weight : (n_c, n). axis : (n_c, 3).
+    weight : (n_c or more, n). axis : (n_c or more, 3). quat : (n, 4). stretch : (n,).
     out_sum : (n_c,). out_border : (n, b, n_c).
     """
     n, b, n_c = out_border.shape
     d = np.empty(3)
     for j in range(n):
-        now = length[j] * (1.0 + stretch[j])
+        now = rod.length[j] * (1.0 + stretch[j]) + load * held.reach[j]
         for k in range(n_c):
             w = weight[k, j]
+            for i in range(b):
+                out_border[j, i, k] = 0.0
             if w == 0.0:
                 continue
             into_frame(quat[j], axis[k], d)
@@ -69,36 +80,35 @@ def position_rows(length, weight, axis, quat, stretch, out_sum, out_border):
             out_border[j, 0, k] = -w * now * d[1]
             out_border[j, 1, k] = w * now * d[0]
             if b == 4:
-                out_border[j, 3, k] = w * length[j] * d[2]
+                out_border[j, 3, k] = w * rod.length[j] * d[2]
 
 
 @kernel
-def lengthened(rod, held, stretch, load):
-    """Strains (n,) that make edges as long as they are: their own, and what the load adds."""
-    strain = stretch.copy()
-    for j in range(strain.shape[0]):
-        if held.reach[j] != 0.0:
-            strain[j] += load * held.reach[j] / rod.length[j]
-    return strain
+def assemble(rod, held, quat, stretch, force, load, out):
+    """Derivatives of the Lagrangian; see `System` (``out``), `rod.Rod`, `supports.Supports`.
 
-
-@kernel
-def assemble(rod, held, quat, stretch, force, load):
-    """Derivatives of the Lagrangian; see `System`, `rod.Rod`, `supports.Supports`."""
+    Returns
+    -------
+    tuple : elastic energy; dL/dload, the generalised force that does work on the load; d2L/dload2;
+        rounding error of an entry of the gradient, estimated; first vertex that turns or twists by
+        more than 160 degrees, or -1.
+    """
     n, b = held.free.shape
     n_s = rod.cell.shape[0]
     n_c = held.target.shape[0]
-    grad = np.zeros((n, b))
-    diag = np.zeros((n, b, b))
-    off = np.zeros((n, b, b))
-    gap = np.zeros(n_c)
-    border = np.zeros((n, b, n_c))
-    strain = lengthened(rod, held, stretch, load)
-    position_rows(rod.length, held.weight, held.axis, quat, strain, gap, border)
+    grad, diag, off, column = out.grad, out.diag, out.off, out.load_column
+    border, load_border = out.border, out.load_border
+    for j in range(n):
+        for i in range(b):
+            grad[j, i] = 0.0
+            column[j, i] = 0.0
+            for k in range(b):
+                diag[j, i, k] = 0.0
+                off[j, i, k] = 0.0
     for k in range(n_c):
-        gap[k] -= held.target[k]
-    column = np.zeros((n, b))
-    load_border = np.zeros(n_c)
+        out.gap[k] = -held.target[k]
+        load_border[k] = 0.0
+    position_rows(rod, held, held.weight, held.axis, quat, stretch, load, out.gap, border)
     load_grad, load_hess, energy, noise = 0.0, 0.0, 0.0, 0.0
     bent_too_far = -1
 
@@ -165,7 +175,7 @@ def assemble(rod, held, quat, stretch, force, load):
     pull = np.empty(3)
     for j in range(n):
         eps = stretch[j]
-        now = rod.length[j] * (1.0 + strain[j])
+        now = rod.length[j] * (1.0 + eps) + load * held.reach[j]
         into_frame(quat[j], held.turn_axis, va)
         for i in range(3):
             va[i] *= held.turn[j]
@@ -212,20 +222,17 @@ def assemble(rod, held, quat, stretch, force, load):
             for k in range(n_c):
                 into_frame(quat[j], held.axis[k], va)
                 load_border[k] += held.weight[k, j] * reach * va[2]
-    return System(
-        energy,
-        grad,
-        diag,
-        off,
-        gap,
-        border,
-        column,
-        load_border,
-        load_grad,
-        load_hess,
-        noise,
-        bent_too_far,
-    )
+    return energy, load_grad, load_hess, noise, bent_too_far
+
+
+def derivatives(
+    rod: Any, held: Any, quat: Array, stretch: Array, force: Array, load: float
+) -> tuple[System, tuple[float, float, float, float, int]]:
+    """Return the `System` of a state in arrays of its own, and the numbers from `assemble`."""
+    (n, b), n_c = held.free.shape, len(held.target)
+    sizes = ((n, b), (n, b, b), (n, b, b), n_c, (n, b, n_c), (n, b), n_c)
+    found = System(*(np.empty(size) for size in sizes))
+    return found, assemble(rod, held, quat, stretch, force, load, found)
 
 
 @kernel
@@ -245,19 +252,11 @@ def _relative_rotation(p, out_R):
 
 
 @kernel
-def take_out(free, diag, off, border):
-    """Copies of Hessian blocks and border with the unknowns that are not ``free`` (n, b) taken out.
+def hold(free, out_diag, out_off, out_border):
+    """Take the unknowns that are not ``free`` (n, b) out of Hessian blocks and border.
 
     A held unknown's row and column are those of the identity: it stays put and counts as positive.
     """
-    diag, off, border = diag.copy(), off.copy(), border.copy()
-    hold(free, diag, off, border)
-    return diag, off, border
-
-
-@kernel
-def hold(free, out_diag, out_off, out_border):
-    """`take_out` in place."""
     n, b = free.shape
     for j in range(n):
         for i in range(b):

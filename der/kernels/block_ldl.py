@@ -25,12 +25,10 @@ SciPy has banded Cholesky and LU, but no symmetric-indefinite band solver that t
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from der.kernels.dense import invert, invert_one, invert_three, solve_dense
+from der.kernels.workspace import MAX_DELAYED, Array, blocks, rows
 from der.packs.kernel import kernel
-
-MAX_DELAYED = 8
 
 _DELAY_BELOW = 1e-4  # relative size below which a pivot is delayed: growth stays under its inverse
 _NO_STIFFNESS = 1e-10  # of the row's largest entry: an unknown without stiffness of its own
@@ -40,12 +38,12 @@ _NOTHING = 1e-18  # of the largest entry: a row without stiffness at all
 class Factors(NamedTuple):
     """Factors of K. ``border`` holds B and the columns of delayed pivots, M = m + delayed."""
 
-    inverse: NDArray[np.float64]  # (n, b, b) inverses of the pivot blocks
-    lower: NDArray[np.float64]  # (n, b, b) subdiagonal blocks of L; lower[0] is not used
-    border: NDArray[np.float64]  # (n, b, M)
-    lifted: NDArray[np.float64]  # (n, b, M) T^-1 border
-    schur: NDArray[np.float64]  # (M, M) C - border' lifted
-    magnitude: NDArray[np.float64]  # (M,) size of the terms that make the diagonal of schur
+    inverse: Array  # (n, b, b) inverses of the pivot blocks
+    lower: Array  # (n, b, b) subdiagonal blocks of L; lower[0] is not used
+    border: Array  # (n, b, M)
+    lifted: Array  # (n, b, M) T^-1 border
+    schur: Array  # (M, M) C - border' lifted
+    magnitude: Array  # (M,) size of the terms that make the diagonal of schur
     negative: int  # negative pivots of T
 
 
@@ -98,24 +96,28 @@ def _reduce(b, j, diag, off, inverse, unit, out_lower, out_pivot):
 
 
 @kernel
-def factor(diag, off, border):
-    """Factor K; see `Factors`. ``negative`` is -1 where too many pivots had to be delayed.
+def factor(diag, off, border, work):
+    """Factor K in ``work``; returns the factors, and what is left of that.
 
     Parameters
     ----------
     diag : (n, b, b) diagonal blocks, symmetric. off : (n - 1 or more, b, b) blocks T[j, j+1].
     border : (n, b, m).
+
+    Returns
+    -------
+    Factors, work : ``negative`` is -1 where too many pivots had to be delayed.
     """
     n, b, m = border.shape
-    inverse = np.empty((n, b, b))
-    lower = np.empty((n, b, b))
+    inverse, work = blocks(work, n, b, b)
+    lower, work = blocks(work, n, b, b)
     where = np.empty((MAX_DELAYED, 2), dtype=np.int64)
     added = np.empty(MAX_DELAYED)
     delayed = np.zeros(b)
     pivot = np.empty((b, b))
     count = 0
     negative = 0
-    size = np.empty((n, b))  # an unknown's own stiffness: pivots are judged by it
+    size, work = rows(work, n, b)  # an unknown's own stiffness: pivots are judged by it
     whole = _own_stiffness(diag, off, size)
     unit = np.empty(b)  # its inverse square root
     for j in range(n):
@@ -146,14 +148,16 @@ def factor(diag, off, border):
         count, negative = 0, -1
 
     M = m + count
-    wide = np.zeros((n, b, M))
+    wide, work = blocks(work, n, b, M)
+    lifted, work = blocks(work, n, b, M)
     for j in range(n):
         for k in range(b):
-            for p in range(m):
-                wide[j, k, p] = border[j, k, p]
+            for p in range(M):
+                wide[j, k, p] = border[j, k, p] if p < m else 0.0
+                lifted[j, k, p] = wide[j, k, p]
     for d in range(count):
         wide[where[d, 0], where[d, 1], m + d] = 1.0
-    lifted = wide.copy()
+        lifted[where[d, 0], where[d, 1], m + d] = 1.0
     solve_band(inverse, lower, lifted)
     schur = np.zeros((M, M))
     magnitude = np.zeros(M)
@@ -170,7 +174,7 @@ def factor(diag, off, border):
     for p in range(M):
         for q in range(p):
             schur[q, p] = schur[p, q]
-    return Factors(inverse, lower, wide, lifted, schur, magnitude, negative)
+    return Factors(inverse, lower, wide, lifted, schur, magnitude, negative), work
 
 
 @kernel
@@ -255,7 +259,7 @@ def solve(factors, x):
 
 
 @kernel
-def solve_augmented(factors, m, column, column_border, row, row_border, corner, x, y, z):
+def solve_augmented(factors, m, column, column_border, row, row_border, corner, x, y, z, work):
     """Solve K with one more column and one more, unsymmetric, row, such as an arclength condition.
 
         [ T     B              column        ] [x]   [x]
@@ -269,6 +273,7 @@ def solve_augmented(factors, m, column, column_border, row, row_border, corner, 
     factors : of K, whose own border has ``m`` columns.
     column, row : (n, b). column_border, row_border : (m,). corner : float.
     x, y, z : (n, b, r), (m, r), (r,), replaced by the solution.
+    work : memory for n b (r + 1) numbers.
 
     Returns
     -------
@@ -276,7 +281,7 @@ def solve_augmented(factors, m, column, column_border, row, row_border, corner, 
     """
     n, b, r = x.shape
     M = factors.schur.shape[0]
-    Y = np.empty((n, b, r + 1))
+    Y, _ = blocks(work, n, b, r + 1)
     for j in range(n):
         for k in range(b):
             Y[j, k, 0] = column[j, k]
@@ -328,49 +333,51 @@ def solve_augmented(factors, m, column, column_border, row, row_border, corner, 
 
 
 @kernel
-def solve_refined(diag, off, factors, m, column, column_border, row, row_border, corner, x, y, z):
+def solve_refined(
+    diag, off, factors, m, column, column_border, row, row_border, corner, x, y, z, work
+):  # fmt: skip
     """`solve_augmented` with its residual checked, and refined once where that is not tiny.
 
-    ``diag`` and ``off`` are the blocks that were factored. Returns False where the matrix is
-    singular, or where refinement leaves a residual above 1e-6 of the right-hand side and of the
-    terms that should cancel in it: the caller must not use such a solution.
+    ``diag`` and ``off`` are the blocks that were factored; ``work`` has n b (3 r + 1) numbers.
+    Returns False where the matrix is singular, or where refinement leaves a residual above 1e-6 of
+    the right-hand side and of the terms that should cancel in it: the caller must not use such a
+    solution.
     """
-    r = x.shape[2]
-    wanted_x, wanted_y, wanted_z = x.copy(), y.copy(), z.copy()
-    if not solve_augmented(factors, m, column, column_border, row, row_border, corner, x, y, z):
+    n, b, r = x.shape
+    rx, work = blocks(work, n, b, r)
+    wanted_x, work = blocks(work, n, b, r)
+    wanted_y, wanted_z = y.copy(), z.copy()
+    ry, rz = y.copy(), z.copy()
+    for j in range(n):
+        for k in range(b):
+            for c in range(r):
+                rx[j, k, c] = x[j, k, c]
+                wanted_x[j, k, c] = x[j, k, c]
+    if not solve_augmented(
+        factors, m, column, column_border, row, row_border, corner, x, y, z, work
+    ):
         return False
-    rx, ry, rz = wanted_x.copy(), wanted_y.copy(), wanted_z.copy()
     border = factors.border
     error = _subtract(
         diag, off, border, column, column_border, row, row_border, corner, x, y, z, rx, ry, rz
     )
     if error < 1e-12:
         return True
-    if not solve_augmented(factors, m, column, column_border, row, row_border, corner, rx, ry, rz):
+    if not solve_augmented(
+        factors, m, column, column_border, row, row_border, corner, rx, ry, rz, work
+    ):
         return False
     for c in range(r):
-        for j in range(x.shape[0]):
-            for k in range(x.shape[1]):
+        for j in range(n):
+            for k in range(b):
                 x[j, k, c] += rx[j, k, c]
         for p in range(m):
             y[p, c] += ry[p, c]
         z[c] += rz[c]
     error = _subtract(
-        diag,
-        off,
-        border,
-        column,
-        column_border,
-        row,
-        row_border,
-        corner,
-        x,
-        y,
-        z,
-        wanted_x,
-        wanted_y,
-        wanted_z,
-    )
+        diag, off, border, column, column_border, row, row_border, corner, x, y, z,
+        wanted_x, wanted_y, wanted_z,
+    )  # fmt: skip
     return error < 1e-6
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from der.kernels.assembly import lengthened, position_rows
+from der.kernels.assembly import position_rows
 from der.kernels.quaternions import Array, into_frame, relative
 from der.kernels.strain import vertex_energy
 from der.packs.kernel import kernel
@@ -117,14 +117,9 @@ def conditions(rod, held, motion, out_pull):
         out_pull.gap[k] = -held.target[k]
         out_pull.load_border[k] = 0.0
     position_rows(
-        rod.length,
-        held.weight,
-        held.axis,
-        motion.quat,
-        lengthened(rod, held, motion.stretch, motion.load[0]),
-        out_pull.gap,
-        out_pull.border,
-    )
+        rod, held, held.weight, held.axis, motion.quat, motion.stretch, motion.load[0],
+        out_pull.gap, out_pull.border,
+    )  # fmt: skip
     v = np.empty(3)
     for j in range(rod.length.shape[0]):
         if held.turn[j] != 0.0:
@@ -165,7 +160,7 @@ def _edge_forces(rod, held, motion, out_pull):
 
 @kernel
 def clear(out_rows):
-    """Zero everywhere: loops, since assigning to a slice takes numba a second to compile."""
+    """Zero everywhere."""
     n, b = out_rows.shape
     for j in range(n):
         for i in range(b):

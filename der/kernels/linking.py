@@ -146,58 +146,75 @@ def _quadrilateral(p, q, r, s):
     return area * np.sign(triple)
 
 
-@kernel
-def unfold(quat, copies):
+def unfold(quat: Array, copies: int) -> Array:
     """Frames (N, 4) of the full ring from those of a sector, from the first grip on.
 
     A quarter (``copies`` = 4) runs from a free point to the second grip, a half (2) from grip to
-    grip. Half-turns about E2 and E3 that run the curve backwards carry d2 along and reverse d1 and
-    d3: q -> e2 q e2 and q -> e3 q e2.
+    grip.
     """
-    n = quat.shape[0]
-    if copies == 1:
-        return quat.copy()
-    arm = n if copies == 2 else 2 * n - 1
-    out = np.empty((2 * arm - 2, 4))
-    shift = arm - n
+    whole = np.empty((_whole(len(quat), copies), 4))
+    _unfold(quat, copies, whole)
+    return whole
+
+
+@kernel
+def _whole(n, copies):
+    """Edges of the ring made of ``copies`` of a sector with ``n``, which ends in half edges."""
+    return n if copies == 1 else copies * (n - 1)
+
+
+@kernel
+def _unfold(quat, copies, out_quat):
+    """Half-turns about E2 and E3 that run the curve backwards carry d2 along, reverse d1 and d3.
+
+    q -> e2 q e2 and q -> e3 q e2.
+    """
+    n, whole = quat.shape[0], out_quat.shape[0]
+    shift = n - 1 if copies == 4 else 0
     for j in range(n):
         for i in range(4):
-            out[shift + j, i] = quat[j, i]
+            out_quat[shift + j, i] = quat[j, i]
     for j in range(shift):
-        q = quat[shift - j]
-        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = -q[0], q[1], -q[2], q[3]
-    for j in range(arm, 2 * arm - 2):
-        q = out[2 * arm - 2 - j]
-        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = -q[1], -q[0], -q[3], -q[2]
-    return out
+        q, out = quat[shift - j], out_quat[j]
+        out[0], out[1], out[2], out[3] = -q[0], q[1], -q[2], q[3]
+    for j in range(shift + n, whole):
+        q, out = out_quat[whole - j], out_quat[j]
+        out[0], out[1], out[2], out[3] = -q[1], -q[0], -q[3], -q[2]
 
 
-@kernel
-def unfold_lengths(length, copies):
+def unfold_lengths(length: Array, copies: int) -> Array:
     """Edge lengths (N,) of the full ring from those (n,) of a sector, which ends in half edges."""
-    n = length.shape[0]
-    if copies == 1:
-        return length.copy()
-    arm = n if copies == 2 else 2 * n - 1
-    out = np.empty(2 * arm - 2)
-    shift = arm - n
-    for j in range(n):
-        out[shift + j] = length[j] * (2.0 if j == 0 or j == n - 1 else 1.0)
-    for j in range(shift):
-        out[j] = out[2 * shift - j]
-    for j in range(arm, 2 * arm - 2):
-        out[j] = out[2 * arm - 2 - j]
-    return out
+    whole = np.empty(_whole(len(length), copies))
+    _unfold_lengths(length, copies, whole)
+    return whole
 
 
 @kernel
-def vertices(quat, length):
+def _unfold_lengths(length, copies, out_length):
+    n, whole = length.shape[0], out_length.shape[0]
+    shift = n - 1 if copies == 4 else 0
+    for j in range(n):
+        halved = copies > 1 and (j == 0 or j == n - 1)
+        out_length[shift + j] = length[j] * (2.0 if halved else 1.0)
+    for j in range(shift):
+        out_length[j] = out_length[2 * shift - j]
+    for j in range(shift + n, whole):
+        out_length[j] = out_length[whole - j]
+
+
+def vertices(quat: Array, length: Array) -> Array:
     """Vertices (N, 3) of the closed ring with these edges; the origin is midway between the grips.
 
     Vertex j ends edge j; the grips are the middles of edges 0 and N/2.
     """
+    x = np.empty((len(quat), 3))
+    _vertices(quat, length, x)
+    return x
+
+
+@kernel
+def _vertices(quat, length, out_x):
     n = quat.shape[0]
-    x = np.empty((n, 3))
     d3 = np.empty(3)
     before = np.zeros(3)
     origin = np.zeros(3)
@@ -208,18 +225,21 @@ def vertices(quat, length):
             if j == 0 or j == n // 2:
                 origin[i] += 0.5 * (before[i] + 0.5 * step)
             before[i] += step
-            x[j, i] = before[i]
+            out_x[j, i] = before[i]
     for j in range(n):
         for i in range(3):
-            x[j, i] -= origin[i]
-    return x
+            out_x[j, i] -= origin[i]
 
 
 @kernel
 def link_number(quat, length, copies):
     """Tw + Wr of the ring made of ``copies`` of a sector with frames (n, 4) and lengths (n,)."""
-    whole = unfold(quat, copies)
-    return twist(whole) + writhe(vertices(whole, unfold_lengths(length, copies)), copies)
+    n = _whole(quat.shape[0], copies)
+    whole, lengths, x = np.empty((n, 4)), np.empty(n), np.empty((n, 3))
+    _unfold(quat, copies, whole)
+    _unfold_lengths(length, copies, lengths)
+    _vertices(whole, lengths, x)
+    return twist(whole) + writhe(x, copies)
 
 
 def link(quat: Array, length: Array, copies: int = 1) -> tuple[int, float]:

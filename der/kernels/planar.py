@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from der.kernels.block_ldl import factor, inertia, solve_refined
+from der.kernels.workspace import MAX_DELAYED
 from der.packs.kernel import kernel
 
 Array = NDArray[np.float64]
@@ -153,27 +154,42 @@ def _largest(values):
 
 
 @kernel
-def correct_planar(rod, phi, force, load, directed, row, row_load, pin, tolerance, most):
+def _work(n, m):
+    """Memory for the factors of ``n`` entries with ``m`` columns, and one solution."""
+    return np.empty(n * (3 + 2 * (m + MAX_DELAYED) + 4))
+
+
+@kernel
+def correct_planar(
+    rod, load, directed, row, row_load, pin, tolerance, most, out_phi, out_force, out_x, out_y
+):
     """Newton's method, the load given, or, ``directed``, corrections orthogonal to a direction.
 
     Parameters
     ----------
     row, row_load : (n, 1), mass-weighted; they orient the tangent, too.
     pin : (n, 1, p) directions in which nothing is corrected: motions that cost nothing.
+    out_phi, out_force : (n,), (m,) the start, moved to the end.
+    out_x, out_y : (n, 1, 1), (m + p, 1) the tangent there.
 
     Returns
     -------
-    tuple : the entries of `planar_march.Solved`, in their order; rates are (n, 1, 1), (m + p, 1).
+    tuple : position in `REASONS`, iterations, residual; load, energy, dL/dload, and the rates of
+        load and of dL/dload along the tangent; negative eigenvalues of the bordered matrix, vertex
+        bent too far.
     """
-    n, m, p = rod.length.shape[0], force.shape[0], pin.shape[2]
-    phi, force = phi.copy(), force.copy()
-    x, y, z = np.zeros((n, 1, 1)), np.zeros((m + p, 1)), np.zeros(1)
+    phi, force, x, y, z = out_phi, out_force, out_x, out_y, np.zeros(1)
+    n, m, p = phi.shape[0], force.shape[0], pin.shape[2]
     no_row, no_border = np.zeros((n, 1)), np.zeros(m + p)
     load_border = np.zeros(m + p)
     border = np.zeros((n, 1, m + p))
+    work = _work(n, m + p)
     for j in range(n):
+        x[j, 0, 0] = 0.0
         for k in range(p):
             border[j, 0, m + k] = pin[j, 0, k]
+    for k in range(m + p):
+        y[k, 0] = 0.0
     negative, rate, first = -1, 0.0, 0.0
     outcome, iteration = TOO_MANY, 0
     while True:
@@ -194,7 +210,7 @@ def correct_planar(rod, phi, force, load, directed, row, row_load, pin, toleranc
             load_border[k] = system.load_border[k]
             for j in range(n):
                 border[j, 0, k] = system.border[j, 0, k]
-        factors = factor(system.diag, system.off, border)
+        factors, left = factor(system.diag, system.off, border, work)
         last, corner = row, row_load
         if done:
             negative, _ = inertia(factors)
@@ -218,6 +234,7 @@ def correct_planar(rod, phi, force, load, directed, row, row_load, pin, toleranc
             x,
             y,
             z,
+            left,
         ):
             outcome = SINGULAR
             break
@@ -252,22 +269,8 @@ def correct_planar(rod, phi, force, load, directed, row, row_load, pin, toleranc
         load += z[0]
         iteration += 1
     # a plain tuple: to make a named one runs Python, in which Ctrl-C would end the process
-    return (
-        outcome,
-        iteration,
-        residual,
-        phi,
-        force,
-        load,
-        system.energy,
-        system.load_grad,
-        x,
-        y,
-        z[0],
-        rate,
-        negative,
-        system.bent,
-    )
+    values = (system.energy, system.load_grad, z[0], rate)
+    return (outcome, iteration, residual, load, *values, negative, system.bent)
 
 
 @kernel
@@ -277,4 +280,6 @@ def negative_planar(rod, phi, force, load, shift):
     for j in range(rod.rest.shape[0]):
         if rod.free[j]:
             system.diag[j, 0, 0] += shift * rod.length[j]
-    return inertia(factor(system.diag, system.off, system.border))[0]
+    n, _, m = system.border.shape
+    factors, _ = factor(system.diag, system.off, system.border, _work(n, m))
+    return inertia(factors)[0]

@@ -83,39 +83,45 @@ def rotation(quat: Array) -> Array:
 
 
 @kernel
-def rotation_vector(qa, qb):
-    """Rotation vectors (n, 3) [rad], in the frames ``qa`` (n, 4), that turn these into ``qb``."""
-    n = qa.shape[0]
-    w = np.empty((n, 3))
+def turn_between(qa, qb, out_w):
+    """Rotation vector (3,) [rad], in the frame ``qa`` (4,), that turns this into ``qb``."""
     p = np.empty(4)
-    for j in range(n):
-        relative(qa[j], qb[j], p)
-        sine = np.sqrt(p[1] * p[1] + p[2] * p[2] + p[3] * p[3])
-        scale = 2.0
-        if sine > 0.0:
-            # p and -p are the same rotation: take the angle that lies in [0, pi]
-            scale = 2.0 * np.arctan2(sine, abs(p[0])) / sine
-        if p[0] < 0.0:
-            scale = -scale
-        for i in range(3):
-            w[j, i] = scale * p[i + 1]
+    relative(qa, qb, p)
+    sine = np.sqrt(p[1] * p[1] + p[2] * p[2] + p[3] * p[3])
+    scale = 2.0
+    if sine > 0.0:
+        # p and -p are the same rotation: take the angle that lies in [0, pi]
+        scale = 2.0 * np.arctan2(sine, abs(p[0])) / sine
+    if p[0] < 0.0:
+        scale = -scale
+    for i in range(3):
+        out_w[i] = scale * p[i + 1]
+
+
+@kernel
+def _turns_between(qa, qb, out_w):
+    """`turn_between` of each row."""
+    for j in range(out_w.shape[0]):
+        turn_between(qa[j], qb[j], out_w[j])
+
+
+def rotation_vector(qa: Array, qb: Array) -> Array:
+    """Rotation vectors (n, 3) [rad], in the frames ``qa`` (n, 4), that turn these into ``qb``."""
+    w = np.empty((len(qa), 3))
+    _turns_between(qa, qb, w)
     return w
 
 
 @kernel
-def chart_rate(w, omega):
-    """Rates (n, 3) of rotation vectors ``w`` (n, 3) of frames that turn at the rates ``omega``.
+def chart_rate(w, omega, out_rate):
+    """Rate (3,) of the rotation vector ``w`` (3,) of a frame that turns at the rate ``omega``.
 
-    Both in the moving frames q o exp(w/2); to third order in w: dw = omega + w x omega/2 +
+    Both in the moving frame q o exp(w/2); to third order in w: dw = omega + w x omega/2 +
     w x (w x omega)/12.
     """
-    n = w.shape[0]
-    rate = np.empty((n, 3))
-    for j in range(n):
-        x, y, z = w[j, 0], w[j, 1], w[j, 2]
-        a, b, c = omega[j, 0], omega[j, 1], omega[j, 2]
-        u, v, t = y * c - z * b, z * a - x * c, x * b - y * a  # w x omega
-        rate[j, 0] = a + 0.5 * u + (y * t - z * v) / 12.0
-        rate[j, 1] = b + 0.5 * v + (z * u - x * t) / 12.0
-        rate[j, 2] = c + 0.5 * t + (x * v - y * u) / 12.0
-    return rate
+    x, y, z = w[0], w[1], w[2]
+    a, b, c = omega[0], omega[1], omega[2]
+    u, v, t = y * c - z * b, z * a - x * c, x * b - y * a  # w x omega
+    out_rate[0] = a + 0.5 * u + (y * t - z * v) / 12.0
+    out_rate[1] = b + 0.5 * v + (z * u - x * t) / 12.0
+    out_rate[2] = c + 0.5 * t + (x * v - y * u) / 12.0

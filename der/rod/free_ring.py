@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from der.kernels.assembly import assemble
+from der.kernels.assembly import derivatives
 from der.kernels.quaternions import Array, rotation, rotation_vector
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, free_supports
@@ -136,11 +136,11 @@ def balance(
     """
     supports = free_supports(rod) if supports is None else supports
     no_force = np.zeros(len(supports.target))
-    system = assemble(rod, supports, quat, stretch, no_force, load)
+    system, _ = derivatives(rod, supports, quat, stretch, no_force, load)
     free = supports.free.reshape(-1)
     grad = system.grad.reshape(-1)[free]
     border = system.border.reshape(len(free), -1)[free]
-    force = -np.linalg.lstsq(border, grad, rcond=None)[0]
+    force = -np.asarray(np.linalg.lstsq(border, grad, rcond=None)[0], dtype=np.float64)
     gap = float(np.abs(system.gap).max())
     residual = max(float(np.abs(grad + border @ force).max()), gap)
     return FreeRing(rod, supports, State(quat, stretch, force, load), residual)

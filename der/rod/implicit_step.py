@@ -87,14 +87,16 @@ def step(
     """
     check_cut(system.rod, system.supports.free)
     control = LOAD_HELD if moment is None else MOMENT_HELD
-    state, _, values, ends, (w, rest) = newton(
-        *system.rod, *system.supports, *guess.but(load=float(guess.load)),
-        control, system.increment(), moment or 0.0, tolerance, _ITERATIONS,
+    quat, stretch, force = guess.quat.copy(), guess.stretch.copy(), guess.force.copy()
+    along, w = system.increment(), np.empty(len(inertial.mass))
+    load, energy, conjugate, _, outcome, where, iterations, _, _, rest = newton(
+        *system.rod, *system.supports, float(guess.load),
+        control, along, moment or 0.0, tolerance, _ITERATIONS,
         begin.quat, begin.stretch, float(begin.load), *inertial,
+        system.work, quat, stretch, force, np.empty(len(along)), w,
     )  # fmt: skip
-    energy, conjugate, _ = values
-    outcome, where, iterations, _, _ = ends
-    return Stepped(State(*state), REASONS[outcome], where, iterations, w, energy, conjugate, rest)
+    state = State(quat, stretch, force, load)
+    return Stepped(state, REASONS[outcome], where, iterations, w, energy, conjugate, rest)
 
 
 def on_the_conditions(system: RodSystem, start: State) -> Stepped:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from der.kernels.quaternions import Array, chart_rate, into_frame, rotation_vector, turned
+from der.kernels.quaternions import Array, chart_rate, into_frame, turn_between, turned
 from der.packs.kernel import kernel
 from der.problem import Increment
 from der.rod.rod import State
@@ -47,31 +47,33 @@ def product(weight, a, b):
 
 
 @kernel
-def difference(free, quat, stretch, force, load, next_quat, next_stretch, next_force, next_load):
+def difference(
+    free, quat, stretch, force, load, next_quat, next_stretch, next_force, next_load, out_jump
+):
     """Increment (m,) that leads from one configuration to the next."""
     n, b = free.shape
     m = force.shape[0]
-    jump = np.zeros(n * b + m + 1)
-    turn = rotation_vector(quat, next_quat)
+    w = np.empty(3)
     for j in range(n):
+        turn_between(quat[j], next_quat[j], w)
         for i in range(b):
-            if free[j, i]:
-                jump[j * b + i] = turn[j, i] if i < 3 else next_stretch[j] - stretch[j]
+            change = w[i] if i < 3 else next_stretch[j] - stretch[j]
+            out_jump[j * b + i] = change if free[j, i] else 0.0
     for k in range(m):
-        jump[n * b + k] = next_force[k] - force[k]
-    jump[n * b + m] = next_load - load
-    return jump
+        out_jump[n * b + k] = next_force[k] - force[k]
+    out_jump[n * b + m] = next_load - load
 
 
 @kernel
-def transport(n, b, jump, rates):
+def transport(n, b, jump, rates, out_rates):
     """Rates (m,) at the end of an increment, in the frames of its start."""
-    own = rates.copy()
-    turn = chart_rate(jump[: n * b].reshape((n, b)), rates[: n * b].reshape((n, b)))
     for j in range(n):
-        for i in range(3):
-            own[j * b + i] = turn[j, i]
-    return own
+        k = j * b
+        chart_rate(jump[k : k + 3], rates[k : k + 3], out_rates[k : k + 3])
+        if b == 4:
+            out_rates[k + 3] = rates[k + 3]
+    for k in range(n * b, rates.shape[0]):
+        out_rates[k] = rates[k]
 
 
 @kernel
@@ -98,16 +100,8 @@ def move(turn, turn_axis, quat, stretch, force, increment):
         force[k] += increment[n * b + k]
 
 
-@kernel
-def _retract(turn, turn_axis, quat, stretch, force, increment):
-    quat, stretch, force = quat.copy(), stretch.copy(), force.copy()
-    move(turn, turn_axis, quat, stretch, force, increment)
-    return quat, stretch, force
-
-
 def retract(supports: Supports, state: State, increment: Increment) -> State:
     """Return ``state`` moved by an increment."""
-    quat, stretch, force = _retract(
-        supports.turn, supports.turn_axis, state.quat, state.stretch, state.force, increment
-    )
+    quat, stretch, force = state.quat.copy(), state.stretch.copy(), state.force.copy()
+    move(supports.turn, supports.turn_axis, quat, stretch, force, increment)
     return State(quat, stretch, force, state.load + float(increment[-1]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,33 +83,31 @@ class PlanarRodSystem:
         along = self.increment(load=1.0) if along is None else along
         row = (self._weight * along)[:n, None]
         pin = np.zeros((n, 1, 0)) if self.pin is None else self.pin[:, None, None]
-        found = correct_planar(
-            rod, guess.phi, guess.force, float(load), hold == PLANE, row, float(along[-1]), pin,
-            tolerance, iterations,
+        phi, force = guess.phi.copy(), guess.force.copy()
+        x, y = np.empty((n, 1, 1)), np.empty((len(force) + pin.shape[2], 1))
+        outcome, taken, residual, load, energy, moment, rate, moment_rate, negative, bent = (
+            correct_planar(
+                rod, float(load), hold == PLANE, row, float(along[-1]), pin, tolerance, iterations,
+                phi, force, x, y,
+            )
         )  # fmt: skip
-        return self._equilibrium(found, pin.shape[2])
+        return PlanarEquilibrium(
+            state=PlanarConfiguration(phi, force, load),
+            parameter=load,
+            tangent=np.concatenate([x[:, 0, 0], y[: len(force), 0], [rate]]),
+            observables={"moment": (moment, moment_rate), "energy": (energy, moment * rate)},
+            index=negative - len(y) if negative >= 0 else None,
+            reason=REASONS[outcome],
+            detail=f"vertex {bent}" if bent >= 0 else "",
+            iterations=taken,
+            residual=residual,
+        )
 
     def _rod_at(self, load: float) -> PlanarRod:
         """The rod at a load; the direction of a strut of length 0 is held."""
         if load != 0.0 or not self.rod.reach.any():
             return self.rod
         return self.rod._replace(free=self.rod.free & (self.rod.reach == 0.0))
-
-    def _equilibrium(self, found: tuple[Any, ...], pins: int) -> PlanarEquilibrium:
-        outcome, taken, residual, phi, force, load, energy, moment, *rates = found
-        phi_rate, force_rate, load_rate, moment_rate, negative, bent = rates
-        m = len(force)
-        return PlanarEquilibrium(
-            state=PlanarConfiguration(phi, force, load),
-            parameter=load,
-            tangent=np.concatenate([phi_rate[:, 0, 0], force_rate[:m, 0], [load_rate]]),
-            observables={"moment": (moment, moment_rate), "energy": (energy, moment * load_rate)},
-            index=negative - m - pins if negative >= 0 else None,
-            reason=REASONS[outcome],
-            detail=f"vertex {bent}" if bent >= 0 else "",
-            iterations=taken,
-            residual=residual,
-        )
 
     def retract(self, state: PlanarConfiguration, increment: Increment) -> PlanarConfiguration:
         """Return a configuration moved by an increment."""

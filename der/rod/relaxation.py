@@ -253,8 +253,10 @@ def _thin(out_album):
     """Keep every second configuration; returns how many."""
     kept = (out_album.load.shape[0] + 1) // 2
     for k in range(1, kept):
-        out_album.quat[k] = out_album.quat[2 * k]
-        out_album.stretch[k] = out_album.stretch[2 * k]
+        for j in range(out_album.stretch.shape[1]):
+            for i in range(4):
+                out_album.quat[k, j, i] = out_album.quat[2 * k, j, i]
+            out_album.stretch[k, j] = out_album.stretch[2 * k, j]
         out_album.load[k] = out_album.load[2 * k]
         out_album.energy[k] = out_album.energy[2 * k]
     return kept
@@ -306,7 +308,7 @@ def _relax(rod, supports, aim, motion, pull, masses, album):
         heaviness *= _HEAVIER if gained else 1.0
         weigh(rod, supports, motion, heaviness, aim.frees_load, masses)
     values = (residual, kinetic, start, energy, pull.load_grad[0])
-    return (outcome, bent_too_far), values, (count, restarts), kept
+    return (outcome, bent_too_far, *values, count, restarts, kept)
 
 
 def _at_rest(supports: Supports, state: State) -> Motion:
@@ -371,10 +373,10 @@ def relax(
     album = Album(np.empty((slots, n, 4)), np.empty((slots, n)), np.empty(slots), np.empty(slots))
     free = moment is not None
     aim = Aim(free, 0.0 if moment is None else moment, *stops, tolerance, most, every)
-    ending = _relax(rod, supports, aim, motion, pull, masses, album)
-    values: tuple[float, float, float, float, float]
-    counts: tuple[int, int]
-    (outcome, where), values, counts, kept = ending
+    outcome, where, residual, kinetic, first, last, conjugate, count, restarts, kept = _relax(
+        rod, supports, aim, motion, pull, masses, album
+    )
+    values = (residual, kinetic, first, last, conjugate)
     no_force = np.zeros(len(pull.force))
     history = tuple(
         State(album.quat[k].copy(), album.stretch[k].copy(), no_force, float(album.load[k]))
@@ -382,4 +384,4 @@ def relax(
     )
     state = State(motion.quat, motion.stretch, pull.force, float(motion.load[0]))
     energies = album.energy[:kept].copy()
-    return Relaxed(state, Rest(outcome), where, *values, history, energies, *counts)
+    return Relaxed(state, Rest(outcome), where, *values, history, energies, count, restarts)

@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from der.kernels.assembly import assemble, lengthened, position_rows, take_out
+from der.kernels.assembly import assemble, hold, position_rows, system_of
 from der.kernels.block_ldl import factor, inertia, solve, solve_refined
 from der.kernels.quaternions import Array
+from der.kernels.workspace import blocks, rows, workspace
 from der.packs.kernel import kernel
 from der.problem import Indices, Softest
 from der.rod.rod import Rod, State
@@ -48,9 +49,10 @@ class Stack(NamedTuple):
     axis: Array  # (k, m, 3)
     conditions: NDArray[np.int64]  # (k,) how many each class has
     starts: Array  # (k, p, n, b, 2) of `start_vectors`; p = 0: no stiffness is wanted
+    work: Array  # memory for kernels
 
 
-def stack(classes: Sequence[SymmetryClass], *, looks: bool = False) -> Stack:
+def stack(classes: Sequence[SymmetryClass], work: Array, *, looks: bool = False) -> Stack:
     """Some classes of one sector, one behind another; ``looks``: for their stiffness, too."""
     sizes = [len(modes.axis) for modes in classes]
     (n, b), m = classes[0].free.shape, max(sizes)
@@ -60,9 +62,8 @@ def stack(classes: Sequence[SymmetryClass], *, looks: bool = False) -> Stack:
     starts = (
         [start_vectors(modes) for modes in classes] if looks else np.empty((len(sizes), 0, n, b, 2))
     )
-    return Stack(
-        np.array([c.free for c in classes]), weight, axis, np.array(sizes), np.array(starts)
-    )
+    free = np.array([c.free for c in classes])
+    return Stack(free, weight, axis, np.array(sizes), np.array(starts), work)
 
 
 def start_vectors(modes: SymmetryClass) -> Array:
@@ -83,38 +84,51 @@ def start_vectors(modes: SymmetryClass) -> Array:
 
 
 @kernel
-def _class_matrix(rod, supports, system, free, weight, axis, quat, stretch, load):
-    """Blocks and border of the Hessian at a state of ``supports``, for the modes of one class."""
-    n, b = supports.free.shape
-    n_c = axis.shape[0]
-    border = np.zeros((n, b, n_c))
-    strain = lengthened(rod, supports, stretch, load)
-    position_rows(rod.length, weight, axis, quat, strain, np.zeros(n_c), border)
-    return take_out(free, system.diag, system.off, border)
+def _class_matrix(rod, supports, system, free, weight, axis, m, state, out_blocks):
+    """Blocks and border of the Hessian at a state of ``supports``, for a class's ``m`` conditions.
+
+    ``state``: frames, stretches and the load. ``out_blocks``: diag, off, border.
+    """
+    quat, stretch, load = state
+    diag, off, border = out_blocks
+    n, b = free.shape
+    for j in range(n):
+        for i in range(b):
+            for k in range(b):
+                diag[j, i, k] = system.diag[j, i, k]
+                off[j, i, k] = system.off[j, i, k]
+    position_rows(rod, supports, weight, axis, quat, stretch, load, np.zeros(m), border)
+    hold(free, diag, off, border)
 
 
 @kernel
-def _stiffness(length, factors, x):
-    """Estimate of the eigenvalue nearest to zero, by `_ROUNDS` of inverse iteration of ``x``.
+def _stiffness(length, factors, start, work):
+    """Estimate of the eigenvalue nearest to zero, by `_ROUNDS` of inverse iteration of ``start``.
 
     The largest compliance in the span of two vectors; one alone would mix modes of either sign.
     """
-    n, b, _ = x.shape
-    start, c = np.empty((n, b, 2)), np.zeros((2, 2))
+    n, b, _ = start.shape
+    x, work = blocks(work, n, b, 2)
+    f, _ = blocks(work, n, b, 2)
+    c = np.zeros((2, 2))
+    for j in range(n):
+        for i in range(b):
+            for r in range(2):
+                x[j, i, r] = start[j, i, r]
     for _ in range(_ROUNDS):
         _orthonormalise(length, x)
         for j in range(n):
             for i in range(b):
                 for r in range(2):
-                    start[j, i, r] = length[j] * x[j, i, r]
-                    x[j, i, r] = start[j, i, r]
+                    f[j, i, r] = length[j] * x[j, i, r]
+                    x[j, i, r] = f[j, i, r]
         if not solve(factors, x):
             return 0.0
     for j in range(n):
         for i in range(b):
             for r in range(2):
                 for q in range(2):
-                    c[q, r] += start[j, i, q] * x[j, i, r]
+                    c[q, r] += f[j, i, q] * x[j, i, r]
     middle, half = 0.5 * (c[0, 0] + c[1, 1]), 0.5 * (c[0, 0] - c[1, 1])
     radius = np.sqrt(half * half + c[0, 1] * c[1, 0])
     largest = middle + radius if middle > 0.0 else middle - radius
@@ -147,7 +161,8 @@ def _orthonormalise(length, out_x):
 def _counts(
     cell, length, mass, rest, bending, stretching, measure, closed,
     free, weight, axis, target, turn, turn_axis, pull, reach,
-    frees, weights, axes, conditions, starts, quat, stretch, force, load, shift,
+    frees, weights, axes, conditions, starts, work, quat, stretch, force, load, shift,
+    out_negative, out_margin, out_stiffness,
 ):  # fmt: skip
     """Index and its safety (k,), and the stiffness of the softest modes (k, p).
 
@@ -155,31 +170,29 @@ def _counts(
     """
     rod = Rod(cell, length, mass, rest, bending, stretching, measure, closed)
     supports = Supports(free, weight, axis, target, turn, turn_axis, pull, reach)
-    classes = Stack(frees, weights, axes, conditions, starts)
-    k, p = classes.starts.shape[:2]
+    classes, p = starts.shape[:2]
     n, b = supports.free.shape
-    negative, margin = np.empty(k, dtype=np.int64), np.empty(k)
-    stiffness = np.zeros((k, p))
-    system = assemble(rod, supports, quat, stretch, force, load)
-    for c in range(k):
-        m = classes.conditions[c]
-        # copies: what they are slices of need not be contiguous, and one kind is compiled
-        own_weight, own_axis = classes.weight[c, :m].copy(), classes.axis[c, :m].copy()
-        own_free = classes.free[c].copy()
-        diag, off, border = _class_matrix(
-            rod, supports, system, own_free, own_weight, own_axis, quat, stretch, load
-        )
+    system, work = system_of(work, n, b, target.shape[0])
+    assemble(rod, supports, quat, stretch, force, load, system)
+    diag, work = blocks(work, n, b, b)
+    off, work = blocks(work, n, b, b)
+    for c in range(classes):
+        m = conditions[c]
+        border, left = blocks(work, n, b, m)
+        _class_matrix(
+            rod, supports, system, frees[c], weights[c], axes[c], m, (quat, stretch, load),
+            (diag, off, border),
+        )  # fmt: skip
         if shift != 0.0:
             for j in range(n):
                 for i in range(b):
                     diag[j, i, i] += shift * rod.length[j]
-        factors = factor(diag, off, border)
-        count, margin[c] = inertia(factors)
-        negative[c] = count - m
-        if count >= 0:
-            for r in range(p):
-                stiffness[c, r] = _stiffness(rod.length, factors, classes.starts[c, r].copy())
-    return negative, margin, stiffness
+        factors, left = factor(diag, off, border, left)
+        count, out_margin[c] = inertia(factors)
+        out_negative[c] = count - m
+        for r in range(p):
+            looks = count >= 0
+            out_stiffness[c, r] = _stiffness(length, factors, starts[c, r], left) if looks else 0.0
 
 
 def index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> int | None:
@@ -189,7 +202,9 @@ def index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> i
     either sign: equal counts certify the index, unequal ones make it None.
     """
     check_cut(rod, modes.free)
-    return _certified(rod, supports, stack([modes]), state)[0][0]
+    (n, b), m = modes.free.shape, max(len(modes.axis), len(supports.target))
+    alone = stack([modes], workspace(n, b, m))
+    return _certified(rod, supports, alone, state)[0][0]
 
 
 def indices_and_stiffness(
@@ -208,24 +223,37 @@ def indices_and_stiffness(
 def _certified(
     rod: Rod, supports: Supports, classes: Stack, state: State
 ) -> tuple[Indices, Softest]:
-    negative, margin, stiffness = _counts(*rod, *supports, *classes, *state, 0.0)
+    negative, margin, stiffness = _counted(rod, supports, classes, state)
     counts: list[int | None] = negative.tolist()
     safe = margin.tolist()
     doubtful = [c for c in range(len(safe)) if negative[c] < 0 or not safe[c] > _SAFE]
     if doubtful:
         shift = _SHIFT * float(rod.stiffness.max())
-        counting = classes._replace(starts=classes.starts[:, :0])
-        at = (*rod, *supports, *counting, *state)
-        below, above = (_counts(*at, s)[0] for s in (-shift, shift))
+        counting = _counting(classes)
+        below, above = (_counted(rod, supports, counting, state, s)[0] for s in (-shift, shift))
         for c in doubtful:
             counts[c] = int(below[c]) if below[c] == above[c] >= 0 else None
     return tuple(counts), tuple(map(tuple, stiffness.tolist()))
 
 
-def raw_index(rod: Rod, supports: Supports, modes: SymmetryClass, state: State) -> int:
-    """The index by the signs of the pivots alone, as a bisection for its changes needs it."""
-    at = (*rod, *supports, *stack([modes]), *state)
-    return int(_counts(*at, 0.0)[0][0])
+def _counted(
+    rod: Rod, supports: Supports, classes: Stack, state: State, shift: float = 0.0
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Index and its safety (k,), and the stiffness of the softest modes (k, p)."""
+    k, p = classes.starts.shape[:2]
+    found = np.empty(k, dtype=np.int64), np.empty(k), np.empty((k, p))
+    _counts(*rod, *supports, *classes, *state, shift, *found)
+    return found
+
+
+def _counting(classes: Stack) -> Stack:
+    """The same without a look at the stiffness."""
+    return classes._replace(starts=classes.starts[:, :0])
+
+
+def raw_index(rod: Rod, supports: Supports, alone: Stack, state: State) -> int:
+    """The index of one class by the signs of the pivots alone, as a bisection for it needs it."""
+    return int(_counted(rod, supports, _counting(alone), state)[0][0])
 
 
 def all_modes(supports: Supports) -> SymmetryClass:
@@ -234,24 +262,31 @@ def all_modes(supports: Supports) -> SymmetryClass:
 
 
 @kernel
-def _solve_class(rod, supports, modes, quat, stretch, force, load, x):
-    """Replace ``x`` (n, b, r) by the displacements under it as forces, on the conditions."""
-    system = assemble(rod, supports, quat, stretch, force, load)
-    diag, off, border = _class_matrix(
-        rod, supports, system, modes.free, modes.weight, modes.axis, quat, stretch, load
-    )
-    n, b, r = x.shape
+def _solve_class(rod, supports, modes, quat, stretch, force, load, work, out_x):
+    """Replace ``out_x`` (n, b, r) by the displacements under it as forces, on the conditions."""
+    n, b, r = out_x.shape
     m = modes.axis.shape[0]
-    none, no_row = np.zeros(m), np.zeros((n, b))
-    factors = factor(diag, off, border)
-    solve_refined(
-        diag, off, factors, m, no_row, none, no_row, none, 1.0, x, np.zeros((m, r)), np.zeros(r)
-    )
+    system, work = system_of(work, n, b, force.shape[0])
+    assemble(rod, supports, quat, stretch, force, load, system)
+    diag, work = blocks(work, n, b, b)
+    off, work = blocks(work, n, b, b)
+    border, work = blocks(work, n, b, m)
+    _class_matrix(
+        rod, supports, system, modes.free, modes.weight, modes.axis, m, (quat, stretch, load),
+        (diag, off, border),
+    )  # fmt: skip
+    no_row, work = rows(work, n, b)
+    for j in range(n):
+        for i in range(b):
+            no_row[j, i] = 0.0
+    none, y, z = np.zeros(m), np.zeros((m, r)), np.zeros(r)
+    factors, work = factor(diag, off, border, work)
+    solve_refined(diag, off, factors, m, no_row, none, no_row, none, 1.0, out_x, y, z, work)
     for j in range(n):
         for i in range(b):
             if not modes.free[j, i]:
                 for k in range(r):
-                    x[j, i, k] = 0.0
+                    out_x[j, i, k] = 0.0
 
 
 def softest_modes(
@@ -275,9 +310,10 @@ def softest_modes(
     start = np.random.default_rng(0).normal(size=(n * b, size)) * modes.free.reshape(-1, 1)
     z, _ = np.linalg.qr(start)  # modes times sqrt(M), orthonormal
     compliance = np.zeros(size)
+    work = workspace(n, b, max(len(modes.axis), len(supports.target)), size)
     for _ in range(30):
         y = np.ascontiguousarray((root * z).reshape(n, b, size))
-        _solve_class(rod, supports, modes, state.quat, state.stretch, state.force, state.load, y)
+        _solve_class(rod, supports, modes, *state, work, y)
         y = root * y.reshape(n * b, size)
         projected = z.T @ y
         before = compliance[:count]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from der.kernels.quaternions import Array
+from der.kernels.workspace import workspace
 from der.problem import PARAMETER, PLANE, Increment, Indices, Softest
 from der.rod import stability
 from der.rod.equilibrium import DIRECTION_HELD, LOAD_HELD, MOMENT_HELD, Equilibrium, correct
@@ -63,8 +64,22 @@ class RodSystem:
         return np.concatenate([mass, np.zeros(len(self.supports.target)), [1.0]])
 
     @cached_property
-    def _stack(self) -> Stack:
-        return stack(list(self.modes.values()), looks=True)
+    def work(self) -> Array:
+        """Memory for kernels, which they use again in each call."""
+        most = max(len(modes.axis) for modes in (all_modes(self.supports), *self.modes.values()))
+        n, b = self.supports.free.shape
+        return workspace(n, b, most)
+
+    @cached_property
+    def _stacks(self) -> dict[str | None, Stack]:
+        return {}
+
+    def _stack(self, symmetry: str | None) -> Stack:
+        """One class, or all of them (None)."""
+        if symmetry not in self._stacks:
+            own = self.modes.values() if symmetry is None else [self.modes[symmetry]]
+            self._stacks[symmetry] = stack(list(own), self.work, looks=True)
+        return self._stacks[symmetry]
 
     def increment(self, q: Array | None = None, load: float = 0.0) -> Increment:
         """Return the increment (m,) of rotations and stretches ``q`` (n, b), and of the load."""
@@ -125,6 +140,7 @@ class RodSystem:
             (_CLOSING[hold], 0.0 if value is None else float(value)),
             tolerance=tolerance,
             iterations=iterations,
+            work=self.work,
         )
 
     def retract(self, state: State, increment: Increment) -> State:
@@ -138,13 +154,15 @@ class RodSystem:
 
     def difference(self, a: State, b: State) -> Increment:
         """Return the increment that leads from one configuration to another."""
-        increment: Increment = difference(self.supports.free, *a, *b)
+        increment = np.empty(len(self._weight))
+        difference(self.supports.free, *a, *b, increment)
         return increment
 
     def transport(self, along: Increment, rates: Increment) -> Increment:
         """Return rates at the end of an increment, in the frames of its start."""
         n, b = self.supports.free.shape
-        moved: Increment = transport(n, b, along, rates)
+        moved = np.empty(len(rates))
+        transport(n, b, along, rates, moved)
         return moved
 
     def inner(self, a: Increment, b: Increment) -> float:
@@ -158,12 +176,12 @@ class RodSystem:
 
     def indices(self, state: State, symmetry: str | None = None) -> tuple[Indices, Softest]:
         """Return certified index and lowest stiffnesses [GJ/a^2] of every class, or of one."""
-        own = self._stack if symmetry is None else stack([self.modes[symmetry]], looks=True)
+        own = self._stack(symmetry)
         return stability.indices_and_stiffness(self.rod, self.supports, own, state)
 
     def count(self, state: State, symmetry: str) -> int:
         """Return the negative eigenvalues of one class by the signs of the pivots alone."""
-        return stability.raw_index(self.rod, self.supports, self.modes[symmetry], state)
+        return stability.raw_index(self.rod, self.supports, self._stack(symmetry), state)
 
     def index(self, state: State) -> int | None:
         """Return the certified index among all motions that the supports leave free."""

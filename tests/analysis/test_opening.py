@@ -8,7 +8,7 @@ import classical
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from rods import turned_all
+from rods import derivatives, turned_all
 
 import der
 from der.analysis.landscape.actuators import struts, wrenches
@@ -19,7 +19,6 @@ from der.analysis.landscape.opening_search import Search, refine, scan
 from der.continuation.arclength import follow
 from der.continuation.events import Events
 from der.continuation.richardson import limit, romberg
-from der.kernels.assembly import assemble
 from der.kernels.forces import Motion, gradient
 from der.kernels.quaternions import rotation
 from der.records.opening import LeastPush
@@ -98,10 +97,6 @@ def lagrangian(rod, supports, state):
     elastic = strains(rod, state)[1].sum()
     elastic += 0.5 * rod.stretching * rod.length @ state.stretch**2
     return elastic + state.force @ gap - state.load * np.sum(supports.pull * e)
-
-
-def derivatives(rod, supports, state):
-    return assemble(rod, supports, state.quat, state.stretch, state.force, float(state.load))
 
 
 @pytest.mark.parametrize("block", [3, 4])

@@ -143,6 +143,8 @@ def test_cubic_beyond_a_step_goes_through_both_of_its_ends():
     assert_allclose(step.beyond(-back), -jump, rtol=0, atol=1e-14)
     assert_allclose(slope(0.0), t, rtol=0, atol=1e-6)
     p = split(ring.supports, rates)
-    q = np.array(chart_rate(-split(ring.supports, jump).q, p.q))  # in the frames of the end
+    q = np.empty_like(p.q)
+    for turn, rate, there in zip(-split(ring.supports, jump).q, p.q, q, strict=True):
+        chart_rate(turn, rate, there)  # in the frames of the end
     first = Direction(q, p.force, p.load).flat
     assert_allclose(slope(-back), first / ring.inner(t, first), rtol=0, atol=1e-6)

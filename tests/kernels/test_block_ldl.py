@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import block_diag, ldl
 
+from der.kernels import block_ldl
 from der.kernels.block_ldl import (
     MAX_DELAYED,
-    factor,
+    Factors,
     inertia,
     invert,
     invert_three,
@@ -18,6 +19,7 @@ from der.kernels.block_ldl import (
     solve_dense,
     solve_refined,
 )
+from der.kernels.workspace import workspace
 
 SAFE = 1e-9  # what stability.py asks of the second value of `inertia`
 
@@ -65,13 +67,18 @@ def random_matrix(seed: int, n: int, b: int, m: int, shift: float = 0.0) -> Matr
     return diag, off, rng.normal(size=(n, b, m))
 
 
+def factor(diag: np.ndarray, off: np.ndarray, border: np.ndarray) -> Factors:
+    """Factors of K, in memory of their own."""
+    return block_ldl.factor(diag, off, border, workspace(*border.shape))[0]
+
+
 def solved(matrix: Matrix, f: np.ndarray, *, refined: bool = False) -> np.ndarray:
     """Solution z (n b + m, 2) of K z = f, with one more column and row that do nothing."""
     diag, off, border = matrix
     n, b, m = border.shape
     x, y, z = f[: n * b].reshape(n, b, 2).copy(), f[n * b :].copy(), np.zeros(2)
     nothing, none = np.zeros((n, b)), np.zeros(m)
-    more = (m, nothing, none, nothing, none, 1.0, x, y, z)
+    more = (m, nothing, none, nothing, none, 1.0, x, y, z, workspace(n, b, m))
     if refined:
         assert solve_refined(diag, off, factor(*matrix), *more)
     else:
@@ -415,7 +422,7 @@ def augmented(matrix: Matrix, seed: int, *, refined: bool = False) -> Augmented:
         ]
     )
     expected = np.linalg.solve(A, np.vstack([x.reshape(n * b, 2), y, z]))
-    more = (m, column, column_border, row, row_border, corner, x, y, z)
+    more = (m, column, column_border, row, row_border, corner, x, y, z, workspace(n, b, m))
     if refined:
         assert solve_refined(diag, off, factor(*matrix), *more)
     else:
@@ -471,7 +478,7 @@ def test_singular_augmented_system_is_refused(refined):
     matrix = random_matrix(10, 2, 3, 1, shift=10.0)
     nothing, none = np.zeros((2, 3)), np.zeros(1)
     x, y, z = np.ones((2, 3, 1)), np.ones((1, 1)), np.ones(1)
-    more = (1, nothing, none, nothing, none, 0.0, x, y, z)
+    more = (1, nothing, none, nothing, none, 0.0, x, y, z, workspace(2, 3, 1))
     if refined:
         assert not solve_refined(*matrix[:2], factor(*matrix), *more)
     else:
@@ -484,5 +491,5 @@ def test_solution_that_refinement_cannot_mend_is_refused():
     factors = factor(2.5 * diag, off, border)
     x, y, z = np.ones((6, 3, 1)), np.ones((1, 1)), np.ones(1)
     nothing, none = np.zeros((6, 3)), np.zeros(1)
-    more = (1, nothing, none, nothing, none, 1.0, x, y, z)
+    more = (1, nothing, none, nothing, none, 1.0, x, y, z, workspace(6, 3, 1))
     assert not solve_refined(diag, off, factors, *more)

@@ -181,4 +181,7 @@ def test_rates_of_rotation_vectors(seed):
         rotation_vector(qa, np.array([turned_by(q, t * o) for q, o in zip(qb, omega, strict=True)]))
         for t in (1e-5, -1e-5)
     )
-    assert_allclose(chart_rate(w, omega), (there - back) / 2e-5, rtol=0, atol=2e-6)
+    found = np.empty((20, 3))
+    for j in range(20):
+        chart_rate(w[j], omega[j], found[j])
+    assert_allclose(found, (there - back) / 2e-5, rtol=0, atol=2e-6)

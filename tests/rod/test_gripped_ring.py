@@ -7,10 +7,10 @@ import classical
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rods import Derivatives, derivatives
 
 from der import Ring, circle, ellipse, rectangle, rectangular_section, triangle
 from der.geometry.mesh import sites
-from der.kernels.assembly import System, assemble
 from der.kernels.quaternions import rotation
 from der.rod.gripped_ring import GrippedRing, free_supports, gripped_ring
 from der.rod.rod import State, discrete_rod
@@ -33,14 +33,12 @@ SECTORS_OF_RINGS = pytest.mark.parametrize(
 )
 
 
-def at(ring: GrippedRing, state: State) -> System:
+def at(ring: GrippedRing, state: State) -> Derivatives:
     """The sector's Lagrangian and its derivatives."""
-    return assemble(
-        ring.rod, ring.supports, state.quat, state.stretch, state.force, float(state.load)
-    )
+    return derivatives(ring.rod, ring.supports, state)
 
 
-def start(ring: GrippedRing) -> System:
+def start(ring: GrippedRing) -> Derivatives:
     """The same on the flat ring, without forces."""
     return at(ring, ring.start)
 
@@ -295,7 +293,7 @@ def test_free_flat_ring_is_in_equilibrium():
     rod = gripped_ring(circle(), SECTION, N, name="full", stretching=40.0).rod
     supports = free_supports(rod)
     flat = gripped_ring(circle(), SECTION, N, name="full").start
-    system = assemble(rod, supports, flat.quat, flat.stretch, np.zeros(3), 0.0)
+    system = derivatives(rod, supports, flat.but(force=np.zeros(3)))
     assert (~supports.free).sum() == 3
     assert_allclose(system.grad, np.zeros((N, 4)), rtol=0, atol=1e-13)
     assert_allclose(system.gap, np.zeros(3), rtol=0, atol=1e-14)

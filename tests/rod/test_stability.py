@@ -9,11 +9,10 @@ import functools
 import numpy as np
 import pytest
 import scipy.linalg
-from rods import dense, lifted, richardson
+from rods import dense, derivatives, lifted, richardson
 
 import der
 from der.analysis.request import Request
-from der.kernels.assembly import assemble
 from der.problem import Point
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
@@ -65,7 +64,7 @@ def load_rate(ring: GrippedRing, symmetry: str, at: Equilibrium, w: np.ndarray) 
     (w, y) . (d(grad)/dgamma, d(gap)/dgamma) is what decides whether gamma can pass.
     """
     state, free = at.state, ring.modes[symmetry].free
-    system = assemble(ring.rod, ring.supports, state.quat, state.stretch, state.force, state.load)
+    system = derivatives(ring.rod, ring.supports, state)
     pushed = np.zeros_like(w)
     for j in range(len(w)):
         pushed[j] += system.diag[j] @ w[j]

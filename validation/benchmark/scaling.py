@@ -8,11 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import der
-from der.kernels.assembly import assemble, take_out
-from der.kernels.block_ldl import factor
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
-from der.rod.rod import State
 from validation.benchmark.extent import Extent
 from validation.benchmark.rings import BARE, circle
 from validation.benchmark.rows import Row, cpu_time, measured
@@ -89,10 +86,5 @@ def _newton(n: int, repeats: int) -> tuple[float, float, GrippedRing]:
 
 def _bytes(ring: GrippedRing) -> int:
     """Bytes that one iteration holds at once: state, derivatives and factors."""
-    state: State = ring.start
-    supports = ring.supports
-    system = assemble(ring.rod, supports, state.quat, state.stretch, state.force, state.load)
-    blocks = take_out(supports.free, system.diag, system.off, system.border)
-    factors = factor(*blocks)
-    arrays = [*state, *supports, *ring.rod, *system, *blocks, *factors]
+    arrays = [*ring.start, *ring.supports, *ring.rod, ring.work]
     return sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))

@@ -17,7 +17,7 @@ from der.analysis.request import Request, ring_of
 from der.bvp.solve import solve_bvp
 from der.errors import NotConverged
 from der.geometry.scale import Scale
-from der.kernels.assembly import assemble
+from der.kernels.assembly import derivatives
 from der.kernels.linking import link
 from der.records.configurations import Shapes
 from der.records.path import NUMBERS, Path
@@ -174,8 +174,8 @@ def _residual(
 ) -> tuple[float, float, float, float]:
     """Residual, its rounding error, energy and M of a state of the full ring."""
     found = balance(ring.rod, quat, stretch, ring.supports, gamma)
-    system = assemble(ring.rod, ring.supports, *found.state)
-    return found.residual, system.noise, system.energy, ring.arm_moment(system.load_grad)
+    _, (energy, conjugate, _, noise, _) = derivatives(ring.rod, ring.supports, *found.state)
+    return found.residual, noise, energy, ring.arm_moment(conjugate)
 
 
 # --- The other kinds -------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from der.kernels.assembly import assemble
+from der.kernels.assembly import derivatives
 from der.kernels.linking import vertices
 from der.kernels.quaternions import Array, rotation
 from der.rod.free_ring import FreeRing
@@ -184,12 +184,12 @@ def _compliant_axes(ring: _Renumbered) -> Array:
     supports = free_supports(rod)
     weight = np.tile(chord_weights(rod.cell, rod.length, ring.far), (3, 1))
     measured = supports._replace(weight=weight, axis=np.eye(3), target=np.zeros(3))
-    border = assemble(rod, measured, state.quat, state.stretch, np.zeros(3), 0.0).border
+    system, _ = derivatives(rod, measured, state.quat, state.stretch, np.zeros(3), 0.0)
     compliance = np.empty((3, 3))
     for k in range(3):
         loaded = supports._replace(pull=weight[0][:, None] * np.eye(3)[k])
         t = split(loaded, RodSystem(rod, loaded).correct(state).tangent)
-        compliance[:, k] = np.einsum("jbi,jb->i", border, t.q) / t.load
+        compliance[:, k] = np.einsum("jbi,jb->i", system.border, t.q) / t.load
     _, axes = np.linalg.eigh(0.5 * (compliance + compliance.T))
     return np.ascontiguousarray(axes.T[::-1])
 

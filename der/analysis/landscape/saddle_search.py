@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from der.kernels.assembly import assemble, take_out
+from der.kernels.assembly import assemble, derivatives, hold, system_of
 from der.kernels.block_ldl import factor, solve_refined
 from der.kernels.quaternions import Array
+from der.kernels.workspace import rows
 from der.packs.kernel import kernel
 from der.rod.equilibrium import Equilibrium
 from der.rod.free_ring import FreeRing, balance
@@ -99,30 +100,32 @@ def _turned(
 
 
 @kernel
-def _system(rod, supports, quat, stretch, force):
-    """Newton's step (n, b, 1) at fixed load, the gradient, and whether the matrix is regular."""
-    system = assemble(rod, supports, quat, stretch, force, 0.0)
-    diag, off, border = take_out(supports.free, system.diag, system.off, system.border)
-    n, b, m = border.shape
-    x, y, z = np.zeros((n, b, 1)), np.zeros((m, 1)), np.zeros(1)
-    none, no_row = np.zeros(m), np.zeros((n, b))
+def _step(rod, supports, quat, stretch, force, work, out_step, out_grad):
+    """Newton's step (n, b, 1) at fixed load, the gradient (n, b); whether the matrix is regular."""
+    n, b = supports.free.shape
+    m = force.shape[0]
+    system, work = system_of(work, n, b, m)
+    assemble(rod, supports, quat, stretch, force, 0.0, system)
+    hold(supports.free, system.diag, system.off, system.border)
+    no_row, work = rows(work, n, b)
+    y, z, none = np.zeros((m, 1)), np.zeros(1), np.zeros(m)
     for j in range(n):
         for i in range(b):
-            if not supports.free[j, i]:
-                system.grad[j, i] = 0.0
-            x[j, i, 0] = -system.grad[j, i]
-    factors = factor(diag, off, border)
-    solved = factors.negative >= 0 and solve_refined(
-        diag, off, factors, m, no_row, none, no_row, none, 1.0, x, y, z
+            no_row[j, i] = 0.0
+            out_grad[j, i] = system.grad[j, i] if supports.free[j, i] else 0.0
+            out_step[j, i, 0] = -out_grad[j, i]
+    factors, work = factor(system.diag, system.off, system.border, work)
+    return factors.negative >= 0 and solve_refined(
+        system.diag, system.off, factors, m, no_row, none, no_row, none, 1.0, out_step, y, z, work
     )
-    return x, system.grad, solved
 
 
 def newton_step(system: RodSystem, here: FreeRing) -> tuple[Array, Array] | None:
     """Newton's step and the gradient (n, b); None where the matrix is singular."""
-    state = here.state
-    step, grad, solved = _system(
-        system.rod, system.supports, state.quat, state.stretch, state.force
+    state, (n, b) = here.state, system.supports.free.shape
+    step, grad = np.empty((n, b, 1)), np.empty((n, b))
+    solved = _step(
+        system.rod, system.supports, state.quat, state.stretch, state.force, system.work, step, grad
     )
     return (step[:, :, 0], grad) if solved else None
 
@@ -134,7 +137,7 @@ def displaced(here: FreeRing, w: Array) -> FreeRing:
     state = system.retract(here.state, system.increment(w))
     free = supports.free.ravel()
     for _ in range(8):
-        found = assemble(here.rod, supports, state.quat, state.stretch, no_force, load)
+        found, _ = derivatives(here.rod, supports, state.quat, state.stretch, no_force, load)
         if float(np.abs(found.gap).max()) < 1e-12:
             break
         border = found.border.reshape(len(free), -1)[free]
