@@ -23,7 +23,6 @@ FINER = (4, 32)  # pixels between two nodes, at least and at most
 PIXELS = 512  # across all nodes
 BETWEEN = 6  # pieces of the line between two points of a boundary
 NEIGHBOURS = 64  # visible places with which a hidden one is compared
-UNSEEN = 10.0  # cells, added to distances across a boundary: such places are the last choice
 
 
 class Sheet(NamedTuple):
@@ -138,26 +137,42 @@ def _on_sides(
     from scipy.spatial import KDTree
 
     far = np.linalg.norm(places[:, None] - cases, axis=2)
-    far[_crossed(places, cases, segments)] = np.inf
-    hidden = np.isinf(far.min(axis=1))
-    chosen: Labels = np.where(hidden, labels, names[np.argmin(far, axis=1)])
+    seen = _first_seen(places, cases, np.argsort(far, axis=1, kind="stable"), segments)
+    hidden = seen < 0
+    chosen: Labels = np.where(hidden, labels, names[seen])
     if hidden.any() and not hidden.all():
         shown = places[~hidden]
-        far, near = KDTree(shown).query(places[hidden], range(1, min(NEIGHBOURS, len(shown)) + 1))
-        for row, place, others in zip(far, places[hidden], near, strict=True):
-            row[_crossed(place[None], shown[others], segments)[0]] += UNSEEN
-        best = near[np.arange(len(near)), np.argmin(far, axis=1)]
-        chosen[hidden] = chosen[~hidden][best]
+        count = range(1, min(NEIGHBOURS, len(shown)) + 1)
+        near = KDTree(shown).query(places[hidden], count)[1]
+        seen = _first_seen(places[hidden], shown, near, segments)
+        chosen[hidden] = chosen[~hidden][np.where(seen < 0, near[:, 0], seen)]
     return chosen
 
 
-def _crossed(places: Array, nodes: Array, segments: Array) -> NDArray[np.bool_]:
-    """Whether a segment lies between place and node, (places, nodes)."""
-    p, q = places[:, None, None], nodes[None, :, None]
+def _first_seen(places: Array, others: Array, near: Labels, segments: Array) -> Labels:
+    """The first of others that no segment hides from a place, by place; -1 where there is none.
+
+    Parameters
+    ----------
+    near : (places, k) numbers of others, from the nearest on
+    """
+    found = np.full(len(places), -1)
+    left = np.arange(len(places))
+    for column in near.T:
+        chosen = column[left]
+        hidden = _crossed(places[left], others[chosen], segments)
+        found[left[~hidden]] = chosen[~hidden]
+        left = left[hidden]
+    return found
+
+
+def _crossed(p: Array, q: Array, segments: Array) -> NDArray[np.bool_]:
+    """Whether a segment lies between places p and q, both (k, 2)."""
+    p, q = p[:, None], q[:, None]
     a, b = segments[:, 0], segments[:, 1]
     sides = _area(p, q, a) * _area(p, q, b) < 0.0
     ends = _area(a, b, p) * _area(a, b, q) < 0.0
-    return np.any(sides & ends, axis=2)
+    return np.any(sides & ends, axis=1)
 
 
 def _area(a: Array, b: Array, c: Array) -> Array:
