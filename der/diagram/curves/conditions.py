@@ -32,9 +32,11 @@ from der.scene import Scene
 
 ACCURATE = 1e-9  # of gamma/pi and M: beyond, a mesh is fitted again
 TIGHT = 1e-11  # increments of a solution from which a condition is judged
-PROBE = 1e-3  # of s: first step of a secant
+PROBE = 1e-3  # of s: first step of a secant, and for differences of dgamma/ds
+LONGEST = 0.1  # of s: a step of a root search
 BULGE = 1e-2  # of s: for a third derivative
-SMALL = 1e-10  # of s: a secant step that has converged
+SMALL = 1e-7  # of s: a secant step that has converged
+NEAR = 1e-4  # of s: a Newton step that leaves its square
 FOLDED = 0.02  # M of a state that is about the folded one; its gamma less pi is less than the cube
 FARTHEST = 0.5  # of s: a state farther away is another one
 MOST = 20
@@ -198,9 +200,9 @@ def snap_back(scene: Scene, seed: Value) -> Value:
     its mirror image may merge in it, and end there.
     """
     system, near = carried(scene, seed)
-    bend = _root(system, near, lambda at: _bend(system, at))
-    _not_folded(bend)
-    return Value(bend.tangent.gamma, bend, system)
+    cusp = _extremum(system, near)
+    _not_folded(cusp)
+    return Value(cusp.tangent.gamma, cusp, system)
 
 
 def _not_folded(at: Solution) -> None:
@@ -269,10 +271,24 @@ def _solved(
     return required(found, "no such state nearby")
 
 
-def _bend(system: Collocation, at: Solution) -> float:
-    """d2 gamma/ds2, by central differences."""
-    ahead, behind = (_moved(system, at, s) for s in (PROBE, -PROBE))
-    return (ahead.tangent.gamma - behind.tangent.gamma) / (2.0 * PROBE)
+def _extremum(system: Collocation, at: Solution) -> Solution:
+    """The solution along the path at which dgamma/ds is stationary (Newton's method).
+
+    Central differences of dgamma/ds are its first and second derivatives.
+    """
+    total = 0.0
+    for _ in range(MOST):
+        ahead, behind = (_moved(system, at, s).tangent.gamma for s in (PROBE, -PROBE))
+        bend = (ahead - behind) / (2.0 * PROBE)
+        change = (ahead - 2.0 * at.tangent.gamma + behind) / PROBE**2
+        step = max(-LONGEST, min(LONGEST, -bend / change)) if change != 0.0 else math.inf
+        total += step
+        if not abs(total) <= FARTHEST:
+            break
+        at = _moved(system, at, step)
+        if abs(step) < NEAR:
+            return at
+    raise NotFound("no such state nearby on the path")
 
 
 def _root(system: Collocation, at: Solution, value: Callable[[Solution], float]) -> Solution:
@@ -288,7 +304,7 @@ def _root(system: Collocation, at: Solution, value: Callable[[Solution], float])
         at, now = new, after
         if abs(step) < SMALL:
             return at
-        step = max(-0.1, min(0.1, step))
+        step = max(-LONGEST, min(LONGEST, step))
     raise NotFound("no such state nearby on the path")
 
 
