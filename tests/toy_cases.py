@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 
 from der.diagram.cases import LABELS, Row
+from der.diagram.curves.asking import call
 from der.diagram.families import family
 
 NOTES = "RING_ORIGAMI_NOTES"  # as in validation.stress.kill_and_resume, whose import is slow
@@ -73,24 +74,32 @@ def wedge(case):
     return Row(case, label, folds, folds, "snap-through", moment=0.0, slope=1.0)
 
 
-def along(solve, batch):
-    """In place of following a slice: one point of a curve, and a row."""
+def along(part, work=None):
+    """In place of the search in a slice: a row, and one point of a curve, made by a worker."""
+    yield [part.case((0.6, 0.7))]
+    return (yield from call(work or one_point, part.bare))
+
+
+def one_point(part):
+    """A curve with one point."""
     from der.diagram.curves.slices import Boundaries
     from der.diagram.scanned_boundaries import BoundaryPoint, Curve
 
-    (task,) = batch
-    case = task.part.family.case("x", (0.6, task.part.plane, 0.6))
-    point = BoundaryPoint(case, math.pi, 0.0, 0.0)
-    return Boundaries([Curve("foldability", "x", (point,))], []), [solve(case)]
+    point = BoundaryPoint(part.case((0.6, 0.6)), math.pi, 0.0, 0.0)
+    return Boundaries([Curve("foldability", "x", (point,))], [])
 
 
-def along_that_dies_once(solve, batch):
+def along_that_dies_once(part):
     """`along`, but the first worker to come to the middle is killed."""
-    if batch[0].part.plane == 0.5:
-        die_once()
-    return along(solve, batch)
+    return along(part, one_point_after_a_death if part.plane == 0.5 else None)
 
 
-def along_with_poison(solve, batch):
+def one_point_after_a_death(part):
+    """`one_point`, but the first worker to come here is killed."""
+    die_once()
+    return one_point(part)
+
+
+def along_with_poison(part):
     """`along`, but the slice in the middle kills every worker."""
-    return deadly(solve) if batch[0].part.plane == 0.5 else along(solve, batch)
+    return along(part, deadly if part.plane == 0.5 else None)

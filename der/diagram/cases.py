@@ -7,8 +7,8 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
-from functools import cache, partial
+from dataclasses import dataclass, fields, replace
+from functools import cache, cached_property, partial
 from importlib.metadata import version
 from typing import Any
 
@@ -78,9 +78,10 @@ class Case:
 
     def to_json(self) -> dict[str, Any]:
         """What is not None, by name; a JSON object."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
+        entries = ((entry.name, getattr(self, entry.name)) for entry in fields(self))
+        return {name: value for name, value in entries if value is not None}
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Hash of the parameters, the tolerance and the version of this package."""
         text = json.dumps([self.to_json(), _version(), LABELS], sort_keys=True)

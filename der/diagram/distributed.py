@@ -7,38 +7,71 @@ where none of them has a loose end (`loose_ends`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from der.bvp.gauss import Array
 from der.diagram.cases import Case, Row
-from der.diagram.curves import polylines as polygons
-from der.diagram.curves.boundaries import boundaries, slice_boundaries
+from der.diagram.curves import polylines
+from der.diagram.curves.asking import Call, Question, answer
+from der.diagram.curves.boundaries import located
 from der.diagram.curves.polylines import distance
 from der.diagram.curves.slices import Boundaries, Slice, joined, slices
 from der.diagram.families import Family
 from der.diagram.jobs import Jobs
-from der.diagram.scan import Scan, Solve, solve_all
+from der.diagram.scan import Scan, Solve, batches, given_up
 from der.diagram.scanned_boundaries import BoundaryPoint, Corner, Curve, scanned_boundaries
 from der.diagram.store import Store
 from der.diagram.workers import Workers
 
 
-@dataclass(frozen=True, eq=False)
-class _Task:
-    """A slice of a cube and its rows; no two are equal."""
+class _Followed:
+    """A slice whose boundaries are sought, and what the search knows and waits for."""
 
-    part: Slice
-    known: tuple[Row, ...]
+    def __init__(self, part: Slice) -> None:
+        self.part = part
+        self.boundaries: Boundaries | None = None  # once they are known
+        self._search = located(part)
+        self._asked: Sequence[Question] = ()
+        self._results: dict[Question, Any] = {}
+        self._go_on(None)
+
+    def open(self, rows: Mapping[str, Row]) -> list[Question]:
+        """Go on, with the rows and results known, up to questions without answer; none: it ends."""
+        while self._asked:
+            left = [one for one in self._asked if self._answer(one, rows) is None]
+            if left:
+                return left
+            self._go_on([self._answer(one, rows) for one in self._asked])
+        return []
+
+    def take(self, question: Call, result: Any) -> None:
+        """Take note of the result of a call; None: it ends its workers, and the search."""
+        if question in self._asked:
+            self._results = {question: result}
+            if result is None:
+                self._asked = ()
+
+    def _answer(self, question: Question, rows: Mapping[str, Row]) -> Any:
+        if isinstance(question, Case):
+            return rows.get(question.key)
+        return self._results.get(question)
+
+    def _go_on(self, answers: Any) -> None:
+        try:
+            self._asked = self._search.send(answers)
+        except StopIteration as end:
+            self._asked, self.boundaries = (), end.value
 
 
 def follow(found: Scan, store: Store, crew: Workers, solve: Solve) -> Boundaries:
     """Boundaries followed in two parameters; rows that are solved for them are kept, too.
 
-    Each slice of a cube is one task. A slice that ends its workers has the boundaries of the scan.
+    All slices are searched at the same time. One that ends its workers has the boundaries of the
+    scan.
 
     Raises
     ------
@@ -47,32 +80,31 @@ def follow(found: Scan, store: Store, crew: Workers, solve: Solve) -> Boundaries
     RuntimeError
         If workers die before they have done anything, or the executor has stopped.
     """
+    jobs: Jobs[Question, list[Any]] = Jobs(crew, partial(_answered, solve))
+    parts = [_Followed(part) for part in slices(found.family, found.sorted_rows)]
+    asked: set[Question] = set()
 
-    def all_of(cases: Sequence[Case]) -> list[Row]:
-        new = [case for case in dict.fromkeys(cases) if case.key not in store.rows]
-        solve_all(new, store, crew, solve=solve)
-        return [store.rows[case.key] for case in cases]
+    def ask() -> None:
+        new = {one: None for part in parts for one in part.open(store.rows) if one not in asked}
+        asked.update(new)
+        jobs.add((one,) for one in new if isinstance(one, Call))
+        jobs.add(batches([one for one in new if isinstance(one, Case)], crew.width))
 
-    if found.family.dimension == 2:
-        return boundaries(found.family, found.sorted_rows, solve=all_of)
-    tasks = [
-        _Task(part, tuple(row for row in store.rows.values() if part.has(row.case)))
-        for part in slices(found.family, found.sorted_rows)
-    ]
-    parts: dict[_Task, Boundaries] = {}
-    for (task,), followed in Jobs(crew, partial(_follow, solve), [(t,) for t in tasks]).done():
-        if followed is None:
-            parts[task] = _scanned(found, task.part)
+    ask()
+    for batch, answers in jobs.done():
+        if isinstance(call := batch[0], Call):
+            for part in parts:
+                part.take(call, None if answers is None else answers[0])
         else:
-            parts[task], rows = followed
-            store.add(rows)
-    return joined(parts[task] for task in tasks)
+            cases = [one for one in batch if isinstance(one, Case)]
+            store.add(given_up(cases) if answers is None else answers)
+        ask()
+    return joined(part.boundaries or _scanned(found, part.part) for part in parts)
 
 
-def _follow(solve: Solve, batch: tuple[_Task, ...]) -> tuple[Boundaries, list[Row]]:
+def _answered(solve: Solve, batch: tuple[Question, ...]) -> list[Any]:
     """What a worker does."""
-    (task,) = batch
-    return slice_boundaries(task.part, task.known, solve)
+    return [answer(solve, question) for question in batch]
 
 
 def _scanned(found: Scan, part: Slice) -> Boundaries:
@@ -122,7 +154,7 @@ def loose_ends(
     for own in squares.values():
         lines = [_places(family, curve)[:, [0, -1]] for curve in own]
         ends = [(c.points[0].case in meet, c.points[-1].case in meet) for c in own]
-        found += [own[n].points[k] for n, k in polygons.loose_ends(lines, ends)]
+        found += [own[n].points[k] for n, k in polylines.loose_ends(lines, ends)]
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Any, Generic, TypeVar
 
@@ -28,7 +28,10 @@ class Jobs(Generic[T, R]):
     """
 
     def __init__(
-        self, crew: Workers, work: Callable[[tuple[T, ...]], R], batches: Sequence[tuple[T, ...]]
+        self,
+        crew: Workers,
+        work: Callable[[tuple[T, ...]], R],
+        batches: Iterable[tuple[T, ...]] = (),
     ) -> None:
         self._crew = crew
         self._work = work
@@ -39,6 +42,10 @@ class Jobs(Generic[T, R]):
         self._deaths: Counter[T] = Counter()
         self._condemned: list[T] = []  # held back until it is known that workers can work at all
         self._in_a_row = 0
+
+    def add(self, batches: Iterable[tuple[T, ...]]) -> None:
+        """Take more batches, also while others are done."""
+        self._waiting.extend(batches)
 
     def done(self) -> Iterator[tuple[tuple[T, ...], R | None]]:
         """Batches and their results, as they are finished.
@@ -51,11 +58,12 @@ class Jobs(Generic[T, R]):
         RuntimeError
             If workers die before they have done anything, or the executor has stopped.
         """
-        while self._submit():
+        while self._submit() or self._condemned:
+            if not self._flight:
+                yield from self._given_up()
             for found in self._collect():
                 yield from self._given_up()
                 yield found
-        yield from self._given_up()
 
     def _given_up(self) -> Iterator[tuple[tuple[T, ...], None]]:
         """What is condemned, once."""

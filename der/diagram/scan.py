@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -204,19 +204,23 @@ def solve_all(
     RuntimeError
         If workers die before they solve anything, or the executor has stopped.
     """
-    work = partial(_solve_batch, solve)
-    for batch, rows in Jobs(crew, work, _batches(cases, crew.width)).done():
-        if rows is None:
-            rows = [failed(case, f"its worker died, {DEATHS} times") for case in batch]
-        store.add(rows)
+    jobs: Jobs[Case, list[Row]] = Jobs(crew, partial(_solve_batch, solve))
+    jobs.add(batches(cases, crew.width))
+    for batch, rows in jobs.done():
+        store.add(given_up(batch) if rows is None else rows)
         if tick is not None:
             tick(len(batch))
 
 
-def _batches(cases: Sequence[Case], width: int) -> list[Batch]:
+def batches(cases: Sequence[Case], width: int) -> list[Batch]:
     """Cases in tasks: few enough that all workers end together."""
     size = min(BATCH, max(1, len(cases) // (4 * width)))
     return [tuple(cases[i : i + size]) for i in range(0, len(cases), size)]
+
+
+def given_up(cases: Iterable[Case]) -> list[Row]:
+    """Rows of cases that end their workers."""
+    return [failed(case, f"its worker died, {DEATHS} times") for case in cases]
 
 
 def _solve_batch(solve: Solve, batch: Batch) -> list[Row]:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from der.diagram.cases import LABELS, Row, solve_case
-from der.diagram.curves.boundaries import _Search as Search
-from der.diagram.curves.boundaries import boundaries
+from der.diagram.curves.asking import answered
+from der.diagram.curves.boundaries import _around, _kept, boundaries
 from der.diagram.curves.conditions import KINDS, NotFound, asymptotic, fresh, numbers
 from der.diagram.curves.corners import Line, Met, mark_corners
 from der.diagram.curves.corners import _has as reaches
@@ -23,7 +23,7 @@ from der.diagram.curves.label_changes import seeds
 from der.diagram.curves.polylines import loose_ends as loose_lines
 from der.diagram.curves.polylines import meetings
 from der.diagram.curves.pruning import beside
-from der.diagram.curves.slices import Slice, SliceCases
+from der.diagram.curves.slices import Slice
 from der.diagram.curves.tracing import At, States, corrected, trace
 from der.diagram.distributed import follow, loose_ends, unexplained
 from der.diagram.families import family
@@ -392,14 +392,14 @@ def test_ends_are_looked_round():
         return Row(case, LABELS[2] if foldable else LABELS[0], foldable, False, "snap-back")
 
     part = Slice(of, "x", None, {})
-    search = Search(SliceCases(part, lambda cases: [label(case) for case in cases]))
-    found = search._around([np.array([0.8, 0.5])], [])
+    end = [np.array([0.8, 0.5])]
+    found = answered(_around(part, end, []), label)
     assert [crossing.kind for crossing in found] == ["foldability"] * 2
     for crossing in found:
         assert np.linalg.norm(crossing.middle - 0.5) == pytest.approx(0.3, abs=1e-3)
     turn = np.linspace(-0.1, 0.1, 21)
     arc = 0.5 + 0.3 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    assert search._around([np.array([0.8, 0.5])], [line_of("foldability", arc, None)]) == []
+    assert answered(_around(part, end, [line_of("foldability", arc, None)]), label) == []
 
 
 def test_a_curve_ends_where_labels_say_so(monkeypatch):
@@ -412,10 +412,12 @@ def test_a_curve_ends_where_labels_say_so(monkeypatch):
         return Row(case, LABELS[2] if foldable else LABELS[0], foldable, False, "snap-back")
 
     part = Slice(of, "x", None, {})
-    search = Search(SliceCases(part, lambda cases: [label(case) for case in cases]))
-    monkeypatch.setattr(search, "_condition", lambda kind: lambda u, s: (float(u[1] - 0.5), s))
+    monkeypatch.setattr(
+        "der.diagram.curves.on_slices.condition_on",
+        lambda part, kind: lambda u, s: (float(u[1] - 0.5), s),
+    )
     line = line_of("foldability", [(0.1, 0.5), (0.4, 0.5), (0.9, 0.5), (0.95, 0.5)], None)
-    ((kept,), met) = search._kept([line])
+    ((kept,), met) = answered(_kept(part, [line]), label)
     assert met == []
     assert kept.places[0] == pytest.approx((0.1, 0.5))
     assert kept.places[-1][0] == pytest.approx(0.53, abs=2e-3)

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from der.bvp.collocation import Collocation, Solution, collocation
+from der.bvp.events import Point
 from der.bvp.gauss import Array
 from der.bvp.released import planar, stiffnesses
 from der.bvp.sectors import sector
 from der.bvp.solve import solve_with_points
-from der.diagram.cases import Row
+from der.diagram.cases import Case, Row
 from der.diagram.curves.conditions import Value, closeness
 from der.errors import NotConverged
 
@@ -89,13 +91,10 @@ def seeds(kind: str, row: Row) -> Iterator[Value]:
     """Solutions of a case from which a condition may start, the likeliest first."""
     if not row.foldable and kind != "exchange":
         return
-    scene = row.case.scene(save_at=())
-    try:
-        _, points = solve_with_points(scene, tolerance=SEED)
-    except NotConverged:
-        return
-    system = collocation(sector(scene))
+    system, points = _path(row.case)
     states = [point.solution for point in points]
+    if not states:
+        return
     folds = [point.solution for point in points if point.kind == "fold"]
     if kind == "stays folded":
         yield from _softest(system, states[-1])
@@ -112,6 +111,17 @@ def seeds(kind: str, row: Row) -> Iterator[Value]:
         return
     for at in chosen:
         yield Value(0.0, at, system)
+
+
+@lru_cache(maxsize=16)  # each kind of boundary may start from it
+def _path(case: Case) -> tuple[Collocation, list[Point]]:
+    """The path of a case; without points where it cannot be followed."""
+    scene = case.scene(save_at=())
+    try:
+        _, points = solve_with_points(scene, tolerance=SEED)
+    except NotConverged:
+        points = []
+    return collocation(sector(scene)), points
 
 
 def _softest(system: Collocation, folded: Solution) -> Iterator[Value]:

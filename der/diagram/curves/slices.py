@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from der.bvp.gauss import Array
 from der.diagram.cases import Case, Row
+from der.diagram.curves.asking import Search, rows_of
 from der.diagram.curves.label_changes import Crossing, Placed
 from der.diagram.families import Family
 from der.diagram.scanned_boundaries import BoundaryPoint, Corner, Curve
-
-Solve = Callable[[Sequence[Case]], Sequence[Row]]  # cases -> their rows, in the same order
 
 
 class Boundaries(NamedTuple):
@@ -41,6 +40,23 @@ class Slice(NamedTuple):
     sheet: str
     plane: float | None  # second coordinate, of a cube
     placed: Placed
+
+    @property
+    def bare(self) -> Slice:
+        """The square without its cases."""
+        return self._replace(placed={})
+
+    @property
+    def height(self) -> float:
+        """Of h/t."""
+        low, high = self.family.ranges["h_over_t"]
+        return high - low
+
+    def case(self, u: Array | tuple[float, float]) -> Case:
+        """The case at a place, also a little outside of the square."""
+        x, y = (min(max(float(part), 0.0), 1.0) for part in u)
+        unit = (x, y) if self.plane is None else (x, self.plane, y)
+        return self.family.case(self.sheet, unit)
 
     def has(self, case: Case) -> bool:
         """Whether a case lies in it."""
@@ -77,56 +93,43 @@ def slices(family: Family, rows: Sequence[Row]) -> list[Slice]:
     ]
 
 
-class SliceCases:
-    """The cases of a slice by their place in the unit square."""
+def bisected(part: Slice, crossings: list[Crossing], width: float) -> Search[list[Crossing]]:
+    """Closer pairs of cases that differ in the same way, all bisected at the same time."""
+    while crossings and max(crossing.gap for crossing in crossings) > width:
+        middles = [crossing.middle for crossing in crossings]
+        rows = yield from rows_of([part.case(middle) for middle in middles])
+        halves = [
+            crossing.halved((float(middle[0]), float(middle[1])), row)
+            for crossing, middle, row in zip(crossings, middles, rows, strict=True)
+        ]
+        crossings = [half for half in halves if half is not None]
+    return crossings
 
-    def __init__(self, part: Slice, solve: Solve) -> None:
-        self.family, self.sheet, self.plane, self.placed = part
-        self.solve = solve
-        low, high = self.family.ranges["h_over_t"]
-        self.height = high - low  # of h/t
 
-    def case(self, u: Array | tuple[float, float]) -> Case:
-        """The case at a place, also a little outside of the square."""
-        x, y = (min(max(float(part), 0.0), 1.0) for part in u)
-        unit = (x, y) if self.plane is None else (x, self.plane, y)
-        return self.family.case(self.sheet, unit)
+def between(part: Slice, narrow: Crossing) -> BoundaryPoint:
+    """The place between two cases, with the last fold of the one that has any."""
+    row = narrow.first if narrow.first.folds else narrow.second
+    gamma = max(row.folds, default=math.nan)
+    return BoundaryPoint(part.case(narrow.middle), gamma, math.nan, part.height * narrow.gap)
 
-    def bisected(self, crossings: list[Crossing], width: float) -> list[Crossing]:
-        """Closer pairs of cases that differ in the same way, all bisected at the same time."""
-        while crossings and max(crossing.gap for crossing in crossings) > width:
-            middles = [crossing.middle for crossing in crossings]
-            rows = self.solve([self.case(middle) for middle in middles])
-            halves = [
-                crossing.halved((float(middle[0]), float(middle[1])), row)
-                for crossing, middle, row in zip(crossings, middles, rows, strict=True)
-            ]
-            crossings = [half for half in halves if half is not None]
-        return crossings
 
-    def between(self, narrow: Crossing) -> BoundaryPoint:
-        """The place between two cases, with the last fold of the one that has any."""
-        row = narrow.first if narrow.first.folds else narrow.second
-        gamma = max(row.folds, default=math.nan)
-        error = self.height * narrow.gap
-        return BoundaryPoint(self.case(narrow.middle), gamma, math.nan, error)
-
-    def chains(self, points: list[BoundaryPoint]) -> Iterator[tuple[BoundaryPoint, ...]]:
-        """Points in the order of their curves: each the nearest to the one before."""
-        left = [(np.array(self._place(p.case)), p) for p in points]
-        left.sort(key=lambda item: tuple(item[0]))
-        chain: list[tuple[Array, BoundaryPoint]] = []
-        while left:
-            apart = [float(np.linalg.norm(u - chain[-1][0])) if chain else 0.0 for u, _ in left]
-            k = int(np.argmin(apart))
-            if apart[k] > 3.0 / self.family.coarse:
-                yield tuple(p for _, p in chain)
-                chain = []
-            else:
-                chain.append(left.pop(k))
-        if chain:
+def chains(family: Family, points: list[BoundaryPoint]) -> Iterator[tuple[BoundaryPoint, ...]]:
+    """Points in the order of their curves: each the nearest to the one before."""
+    left = [(np.array(_place(family, p.case)), p) for p in points]
+    left.sort(key=lambda item: tuple(item[0]))
+    chain: list[tuple[Array, BoundaryPoint]] = []
+    while left:
+        apart = [float(np.linalg.norm(u - chain[-1][0])) if chain else 0.0 for u, _ in left]
+        k = int(np.argmin(apart))
+        if apart[k] > 3.0 / family.coarse:
             yield tuple(p for _, p in chain)
+            chain = []
+        else:
+            chain.append(left.pop(k))
+    if chain:
+        yield tuple(p for _, p in chain)
 
-    def _place(self, case: Case) -> tuple[float, float]:
-        unit = self.family.unit(case) or (0.0,) * self.family.dimension
-        return unit[0], unit[-1]
+
+def _place(family: Family, case: Case) -> tuple[float, float]:
+    unit = family.unit(case) or (0.0,) * family.dimension
+    return unit[0], unit[-1]
