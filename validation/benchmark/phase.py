@@ -1,4 +1,4 @@
-"""Rows of the benchmark on phase diagrams: the gain of more workers, the cost of sending a case.
+"""Rows of the benchmark on phase diagrams: gain of workers, cost of a case, a whole diagram.
 
     python -m validation.benchmark.phase
 
@@ -8,17 +8,21 @@ are not idle, the row says which part of a core's time the cases got.
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import statistics
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path as File
 
 from der.diagram.cases import Case, solve_case
 from der.diagram.cases import Row as Solved
+from der.diagram.diagram import phase_diagram
 from der.diagram.families import family
 from der.diagram.scan import Solve, solve_all
 from der.diagram.store import Store
@@ -29,6 +33,8 @@ from validation.benchmark.rows import Row
 DIAGRAM = "fig3a"
 SIDE = 12  # cases along each side of the diagram, for the gain
 TRIVIAL = 400  # cases, for the cost of sending one
+FINEST = 8  # cells along each side of the diagram that is drawn
+KB = 1 if sys.platform == "darwin" else 1024  # unit of ru_maxrss, in bytes
 
 
 def rows(repeats: int) -> Iterator[Row]:
@@ -37,6 +43,8 @@ def rows(repeats: int) -> Iterator[Row]:
     with workers(2) as crew:
         yield _cost("2 processes", crew, repeats)
     yield from _dask(repeats)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as alone:
+        yield from alone.submit(drawn, DIAGRAM, FINEST).result()
 
 
 def timed(case: Case) -> Solved:
@@ -49,6 +57,24 @@ def timed(case: Case) -> Solved:
 def nothing(case: Case) -> Solved:
     """A row without any work."""
     return Solved(case, "unfoldable")
+
+
+def drawn(name: str, finest: int) -> list[Row]:
+    """A diagram from nothing by two workers, in a process that does nothing else."""
+    import resource  # not on Windows
+
+    started = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        phase_diagram(name, folder, workers=2, finest=finest, progress=False)
+    wall = time.perf_counter() - started
+    own, theirs = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    here, there = (used.ru_utime + used.ru_stime for used in (own, theirs))
+    case = f"{name} --finest {finest}"
+    note = f"CPU time: {here:.1f} s in the main process, {there:.1f} s in two workers"
+    return [
+        Row("phase", f"{case}, 2 workers, wall", wall, "s", note=note),
+        Row("phase", f"{case}, largest memory", own.ru_maxrss * KB / 1e6, "MB", 400.0),
+    ]
 
 
 def _cases(side: int) -> list[Case]:
