@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+import der
 from der.cli.files import check_named
 from der.cli.options import NU
 from der.cli.output import say, show
@@ -106,7 +107,6 @@ def phase(wanted: PhaseOptions) -> int:
 
 def _diagram(wanted: PhaseOptions, name: str, folder: File) -> str:
     """Make one diagram, say what its boundaries leave open, and return its summary."""
-    from der.analysis.fold import fold
     from der.diagram.diagram import doubts, phase_diagram, summary
 
     same = ("workers", "scheduler", "resume", "nu", "sample", "finest")
@@ -114,7 +114,7 @@ def _diagram(wanted: PhaseOptions, name: str, folder: File) -> str:
         name,
         folder,
         ranges=dict(map(_range, wanted.span or ())),
-        check=fold if wanted.check else None,
+        check=der.fold if wanted.check else None,
         progress=not wanted.quiet,
         **{option: getattr(wanted, option) for option in same},
     )

@@ -14,18 +14,18 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from der.diagram.cases import LABELS, PARAMETERS, Row, solve_case
-from der.diagram.curves.slices import Boundaries
-from der.diagram.distributed import follow, loose_ends, unexplained
 from der.diagram.families import FAMILIES, Family, family
 from der.diagram.rod_check import Compared, Fold, rod_check, table
 from der.diagram.scan import Scan, Solve, scan
 from der.diagram.scanned_boundaries import Corner, Curve
 from der.diagram.store import Store
+from der.diagram.workers import Workers
 from der.diagram.workers import workers as started
 from der.records.record import Shown
 from der.utils.files import FilePath, write_whole
@@ -33,9 +33,12 @@ from der.utils.files import FilePath, write_whole
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from der.diagram.curves.slices import Boundaries
+
 __all__ = ["FAMILIES", "PhaseDiagram", "phase_diagram"]
 
 STORE = "cases.sqlite"
+LATER = ("der.diagram.distributed", "der.viz.plots.phase_diagram")  # what the scan does not need
 SAMPLE = 40
 
 Entries: TypeAlias = dict[str, Any]  # of a line of a table, by column; others are left out
@@ -144,10 +147,13 @@ def phase_diagram(
             raise ValueError(
                 f"resume must be asked for in a folder that has cases, {folder} has {len(store)}"
             )
+        crew.start()
+        for module in LATER:  # while they start
+            import_module(module)
         found = scan(wanted, store, crew, solve=solve, progress=progress)
         clock.append(time.perf_counter())
         cases = _write(folder / "cases.csv", CASE_COLUMNS, map(_of_case, found.sorted_rows))
-        bounds = follow(found, store, crew, solve)
+        bounds = _followed(found, store, crew, solve)
         beside = [row for row in store.rows.values() if wanted.unit(row.case) is not None]
     clock.append(time.perf_counter())
     compared = () if check is None else rod_check(found, check, sample)
@@ -158,8 +164,17 @@ def phase_diagram(
     return PhaseDiagram(found, curves, corners, compared, files, seconds)
 
 
+def _followed(found: Scan, store: Store, crew: Workers, solve: Solve) -> Boundaries:
+    """The boundaries of a scan, see `der.diagram.distributed`."""
+    from der.diagram.distributed import follow
+
+    return follow(found, store, crew, solve)
+
+
 def doubts(diagram: PhaseDiagram) -> list[str]:
     """What the boundaries of a diagram lack, a line each; none if they are complete."""
+    from der.diagram.distributed import loose_ends, unexplained
+
     family, curves = diagram.family, diagram.curves
     lines = []
     if left := unexplained(diagram.scan, curves):

@@ -68,6 +68,11 @@ class Processes:
         """The number of processes."""
         return self._number
 
+    def start(self) -> None:
+        """Have them start now, and not at their first task."""
+        for _ in range(self._number):
+            self.executor.submit(os.getpid)
+
     def restart(self) -> None:
         """Start others."""
         self.stop()
@@ -118,6 +123,9 @@ class Cluster:
     def width(self) -> int:
         """Threads of all workers that are there now."""
         return max(1, sum(self._client.nthreads().values()))
+
+    def start(self) -> None:
+        """Do nothing: they are there."""
 
     def restart(self) -> None:
         """Do nothing: the cluster replaces workers itself."""

@@ -53,7 +53,7 @@ def without_curves():
     """Boundaries as the scan sees them: following them is tested by itself."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "der.diagram.diagram.follow",
+            "der.diagram.distributed.follow",
             lambda found, *rest: Boundaries(scanned_boundaries(found), []),
         )
         yield
@@ -141,7 +141,9 @@ def test_what_is_left_open_is_told_also_quietly(diagram, folder, monkeypatch, ca
     """Without boundaries, edges of the scan; with one that ends in the middle, that end."""
     half = [replace(curve, points=curve.points[:2]) for curve in diagram.curves]
     for curves in ([], half):
-        monkeypatch.setattr("der.diagram.diagram.follow", lambda *_, c=curves: Boundaries(c, []))
+        monkeypatch.setattr(
+            "der.diagram.distributed.follow", lambda *_, c=curves: Boundaries(c, [])
+        )
         command(options_of(folder, quiet=True))
     output = capsys.readouterr()
     assert output.out == ""
