@@ -69,6 +69,8 @@ class Scene:
     tolerance : of the residual of an equilibrium, GJ/a.
     scale : the ring's size and stiffness, where texts and pictures are to have units; see
         `dimensional`.
+    finest : edges of the finest of several meshes, a multiple of ``n_edges``: the frames of this
+        one are among those of the finest, as extrapolation needs them; None: ``n_edges``.
 
     Raises
     ------
@@ -99,6 +101,7 @@ class Scene:
     a_over_t: float = 200.0
     tolerance: float = 1e-10
     scale: Scale | None = None
+    finest: int | None = None
 
     def __post_init__(self) -> None:
         for name, kind, like in _STATED:
@@ -106,6 +109,9 @@ class Scene:
                 wanted = f"a der.{kind.__name__} such as der.{like}"
                 raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
         self._replace("n_edges", _integer)
+        self._replace("finest", optional(_integer))
+        if self.finest is not None and self.finest % self.n_edges:
+            raise ValueError(f"finest must be a multiple of {self.n_edges}, got {self.finest!r}")
         sector = sector_name(self.ring, self.sector, self.n_edges)
         for name in ("stability", "error_bars", "shapes", "history", "modes", "forces", "unload"):
             self._replace(name, truth)

@@ -103,6 +103,13 @@ def test_edges_are_a_whole_number(value):
         scene(n_edges=value)
 
 
+def test_a_finest_mesh_has_the_frames_of_the_others():
+    """Else no other mesh could have its frames among them."""
+    assert scene(n_edges=16, finest=64).finest == 64
+    with pytest.raises(ValueError, match=r"^finest must be a multiple of 16, got 40$"):
+        scene(n_edges=16, finest=40)
+
+
 @pytest.mark.parametrize(
     ("n_edges", "sector", "divisor"),
     [

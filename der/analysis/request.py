@@ -102,5 +102,5 @@ def ring_of(scene: Scene, sector: str | None = None, n_edges: int | None = None)
         name=scene.sector if sector is None else sector,
         measure=scene.curvature,
         stretching=scene.stretching,
-        finest=scene.n_edges,
+        finest=scene.finest or scene.n_edges,
     )

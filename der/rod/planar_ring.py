@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from der.continuation.roots import find_root
-from der.geometry.mesh import natural_turning, sites
+from der.geometry.mesh import kink_offsets, natural_turning, sites
 from der.geometry.ring import Ring
 from der.kernels.planar import Array, PlanarRod
 from der.records.configurations import Shapes
@@ -33,6 +33,7 @@ class PlanarRing:
     cell: Array  # (N,) between them
     length: Array  # (N,) of the edges
     rest: Array  # (N,) natural turning, rad
+    kinks_in_cells: bool  # of the natural curvature: errors are not even in the cells' length
 
     @property
     def n_edges(self) -> int:
@@ -127,7 +128,8 @@ def planar_ring(scene: Scene, n_edges: int | None = None) -> PlanarRing:
     cell = np.diff(places)
     rest = natural_turning(scene.ring, places)
     length = 0.5 * (cell + np.roll(cell, 1))
-    return PlanarRing(scene.ring, places, cell, length, rest)
+    uneven = bool(kink_offsets(scene.ring, places).any())
+    return PlanarRing(scene.ring, places, cell, length, rest, uneven)
 
 
 def covered(mesh: PlanarRing, turning: int) -> Array:

@@ -78,11 +78,26 @@ def test_error_holds_what_is_left_of_a_geometric_series():
     h2 = np.array([1.0, 4.0, 16.0])
     one = 1.0 + 1e-3 * h2 + 5e-5 * h2**2 + 2.5e-6 * h2**3
     other = 1.0 + 2e-3 * h2 - 4.2e-5 * h2**2 + 2e-6 * h2**3
-    values, errors = limit(np.column_stack([one, other]))
+    (values,), (errors,) = limit(np.column_stack([one, other])[:, None])
     assert values - 1.0 == pytest.approx([1.6e-4, 1.28e-4], abs=1e-15)
     assert np.ptp(romberg(other)[1:]) < 1e-15
     assert np.all(errors > values - 1.0)
     assert np.all(errors < 2e-3)
+
+
+def test_the_error_of_a_state_is_that_of_the_least_resolved_beside_it():
+    """A last correction that vanishes at a state, and not beside it; r is that of both.
+
+    By hand: coefficients a of h^2 and b of h^4, first -a - 5 b, last 4 b.
+    """
+    h2 = np.array([1.0, 4.0, 16.0])[:, None]
+    a, b = np.array([1e-1, 1e-1, 1e-3, 1e-3]), np.array([0.0, 0.0, 0.0, 1e-5])
+    _, errors = limit((1.0 + a * h2 + b * h2**2)[:, :, None])
+    last, r = 4e-5, 4e-5 / (1e-3 + 5e-5)
+    assert errors[3, 0] == pytest.approx((1.0 + 4.0 * r) * last, rel=1e-8)
+    assert errors[2, 0] == pytest.approx((1.0 + 4.0 * 4e-4) * last, rel=1e-3)  # beside 0.1
+    _, errors = limit((1.0 + a * h2 + b * h2**2)[:, :, None], even=False)
+    assert errors.min() == errors.max() > 1.8 * last
 
 
 @pytest.mark.parametrize("column", ["gamma", "moment", "energy"])

@@ -123,6 +123,23 @@ def test_interrupting_between_meshes_keeps_the_landscape(monkeypatch):
     assert not one.extrapolated
 
 
+def test_errors_of_a_landscape_need_the_frames_of_its_finest_mesh():
+    """A ring through 24 points, whose coarse meshes chose other frames: 12 times outside.
+
+    Held against 512 edges.
+    """
+    t = 2.0 * np.pi * np.arange(24) / 24
+    r = 1.0 + 0.05 * np.cos(4.0 * t)
+    ring = der.profile(points=np.column_stack([r * np.cos(t), r * np.sin(t)]))
+    scene = der.Scene(ring, der.rectangular_section(5.0), error_bars=True, stability=False)
+    one, fine = (
+        landscape(replace(scene, n_edges=n), index_free=False).extrapolated for n in (128, 512)
+    )
+    assert set(one) == set(fine) == {"fold", "open", "gamma", "folded", "slope"}
+    for name, (value, error) in one.items():
+        assert abs(value - fine[name][0]) < error + fine[name][1], name
+
+
 def test_json_of_barriers_has_null_for_nan():
     """NaN is not JSON."""
     curves = barriers_over(der.circle(), [3.0, 8.0], n_edges=32)

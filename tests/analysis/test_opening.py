@@ -313,7 +313,7 @@ def test_least_push_of_a_circle_without_a_mesh():
     changes 1e-4; the value is good to 1e-7, a sixth-order remainder.
     """
     works = [pushed((0, n // 3), "out of plane", n_edges=n).last.work for n in (96, 48, 24)]
-    ((value,), (error,)) = limit(np.array(works)[:, None])
+    (((value,),), ((error,),)) = limit(np.array(works)[:, None, None])
     assert value == pytest.approx(0.021087164, abs=1e-6)
     assert 1e-6 < error < 2e-4
 

@@ -26,14 +26,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from der.analysis.extrapolation.curve import GAMMA, LEVELS, MOMENT, RATE, Family, Place
-from der.continuation.richardson import romberg
+from der.continuation.richardson import UNEVEN, romberg
 from der.kernels.quaternions import Array
 from der.problem import Point
 from der.rod.equilibrium import Equilibrium
 
 _EXACT = 1e-9  # of a scale: a smaller first correction is rounding
 _LEFT = 4.0  # times r^2: what is left of a geometric series, see above
-_UNEVEN = 640.0 / 340.0  # times the last correction: what kinks inside of cells leave
 
 
 def scales_of(family: Family, points: Sequence[Point[Equilibrium]]) -> Array:
@@ -100,7 +99,7 @@ class Corrections:
             near = slice(k, k + 1)
         else:
             near = slice(max(k - 1, 0), k + 2) if self.is_even else slice(None)
-        last = np.abs(self.last[near] @ spread.T).max(axis=0) * (1.0 if self.is_even else _UNEVEN)
+        last = np.abs(self.last[near] @ spread.T).max(axis=0) * (1.0 if self.is_even else UNEVEN)
         errors: Array = last + self.left * np.abs(spread) @ np.abs(self.first[k])
         return errors
 

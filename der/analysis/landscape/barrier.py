@@ -71,10 +71,12 @@ def barrier(scene: Scene) -> Pass:
         one = _pass(scene, run)
         if scene.error_bars and one.fold is not None:
             coarser = meshes(scene.n_edges, str(one.numerics["sector"]))[1:]
-            coarse = [_pass(replace(scene, n_edges=n, error_bars=False), run) for n in coarser]
+            bare = replace(scene, error_bars=False, finest=scene.n_edges)
+            coarse = [_pass(replace(bare, n_edges=n), run) for n in coarser]
             if not run.pressed:
                 heights = [{"fold": level.fold, "open": level.open} for level in (one, *coarse)]
-                one = replace(one, extrapolated=limits(heights))
+                even = not ring_of(scene).kinks_in_cells
+                one = replace(one, extrapolated=limits(heights, even=even))
     return one
 
 

@@ -18,6 +18,7 @@ from der.analysis.request import Request, ring_of
 from der.continuation.richardson import Extrapolated, limits
 from der.problem import Options, Point, Statistics, total_index
 from der.records.landscape import Barriers, Landscape, Rest
+from der.records.path import Path
 from der.rod.equilibrium import Equilibrium
 from der.rod.free_ring import released
 from der.rod.gripped_ring import GrippedRing
@@ -63,13 +64,15 @@ def landscape(
         extrapolates = scene.error_bars and found.folded
         coarser = meshes(scene.n_edges, ring.name)[1:] if extrapolates else ()
         bare = replace(scene, error_bars=False, stability=False, shapes=False, modes=False)
-        each = (replace(bare, n_edges=n) for n in coarser if not run.pressed)
+        each = (replace(bare, n_edges=n, finest=scene.n_edges) for n in coarser if not run.pressed)
         coarse = [landscape(one, index_free=False) for one in each]
     if run.status == "interrupted":
         return replace(found, path=run.marked(found.path))
     if not extrapolates:
         return found
-    return _without_mesh(found, limits([_heights(one) for one in (found, *coarse)]))
+    every = [_heights(one) | _beside(one.path) for one in (found, *coarse)]
+    sure = limits(every, even=not ring.kinks_in_cells)
+    return _without_mesh(found, {name: sure[name] for name in _heights(found) if name in sure})
 
 
 def bare_request(scene: Scene) -> Request:
@@ -125,6 +128,16 @@ def _heights(one: Landscape) -> dict[str, float | None]:
         "gamma": gamma,
         "folded": end.energy - flat.energy if one.folded else None,
         "slope": end.slope if one.folded else None,
+    }
+
+
+def _beside(path: Path) -> dict[str, float | None]:
+    """Folds and limits of the path: how well meshes resolve it, where others vanish by chance."""
+    special = enumerate(point for point in path.points if point.kind in ("fold", "limit"))
+    return {
+        f"{k} {point.kind} {name}": getattr(point, name)
+        for k, point in special
+        for name in ("gamma", "moment", "energy")
     }
 
 

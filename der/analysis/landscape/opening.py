@@ -128,12 +128,13 @@ def _extrapolated(search: Search, free: Pass) -> Extrapolated:
     """Works and loads of the best loadings, extrapolated from the same ones on coarser meshes."""
     levels = [_works(search, search, 1)]
     for times, n in zip((2, 4), meshes(search.scene.n_edges, "full")[1:], strict=True):
-        coarse, why = _begun(replace(search.scene, n_edges=n, error_bars=False), free)
+        bare = replace(search.scene, error_bars=False, finest=search.scene.n_edges)
+        coarse, why = _begun(replace(bare, n_edges=n), free)
         if why:
             return {}
         coarse.most = np.inf
         levels.append(_works(search, coarse, times))
-    return limits(levels)
+    return limits(levels, even=not ring_of(search.scene, "full").kinks_in_cells)
 
 
 def _works(search: Search, level: Search, times: int) -> dict[str, float | None]:

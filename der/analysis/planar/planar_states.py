@@ -222,7 +222,7 @@ def _described(scene: Scene, mesh: PlanarRing, one: Found) -> PlanarState:
         ratios = [packing_ratio(level, at.phi, one.turning) for level, at in levels]
         values["packing"] = [value for value, _ in ratios]
         inexact = max(error for _, error in ratios)
-    sure = _extrapolated(values)
+    sure = _extrapolated(values, even=not any(level.kinks_in_cells for level, _ in levels))
     packing, packing_error = sure.get("packing", (None, None))
     if packing_error is not None:
         packing_error += inexact
@@ -244,12 +244,14 @@ def _on_coarser(
     return at if at.converged else None
 
 
-def _extrapolated(levels: Mapping[str, list[float]]) -> dict[str, tuple[float, float | None]]:
+def _extrapolated(
+    levels: Mapping[str, list[float]], *, even: bool
+) -> dict[str, tuple[float, float | None]]:
     """Extrapolated values and errors, if all three meshes have a value."""
     table = np.array(list(levels.values())).T
     if len(table) < 3:
         return {name: (values[0], None) for name, values in levels.items()}
-    values, errors = (column.tolist() for column in limit(table))
+    (values,), (errors,) = (one.tolist() for one in limit(table[:, None], even=even))
     return dict(zip(levels, zip(values, errors, strict=True), strict=True))
 
 

@@ -154,10 +154,11 @@ def _extrapolated(
             same = [found for level in levels for found in _again(level, track, one.solution)]
         if len(same) == len(levels):
             known.append((k, [values[k], *same]))
-    if known:  # in one call: a correction that vanishes at one state does not at all of them
+    if known:
         rows, tables = zip(*known, strict=True)
-        table = np.array(tables).swapaxes(0, 1).reshape(len(levels) + 1, -1)
-        values[list(rows)], errors[list(rows)] = (v.reshape(-1, 3) for v in limit(table))
+        even = not any(one.mesh.kinks_in_cells for one in (track, *levels))
+        table = np.array(tables).swapaxes(0, 1)
+        values[list(rows)], errors[list(rows)] = limit(table, even=even)
     return values, errors
 
 
