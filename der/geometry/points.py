@@ -26,6 +26,8 @@ LEAST = 1e-9  # of the extent: noise that is rounding of the computer
 NORMAL = 0.6745  # the median size of normal errors, in standard deviations
 COARSE = 4  # grid steps: points nearer to each other are replaced by their mean
 SAMPLED = 10_000  # coordinates among which a grid is sought
+OPEN = 5.0  # times the next largest step: a gap, in which nothing is known of the curve
+STRAIGHT = 0.1  # rad: turns at both ends of a side, which needs no points
 PLANAR = 1e-3  # of the extent
 SMALLEST = 1e-100  # extent: squares of smaller ones are not numbers
 
@@ -57,6 +59,7 @@ def planar_points(points: ArrayLike) -> tuple[ComplexArray, float]:
         raise ValueError(
             f"points must be at least {FEWEST}, each unlike its neighbour, got {len(z)}"
         )
+    _refuse_gap(z)
     turned = z - z[0]
     is_clockwise = np.sum((np.conj(turned) * np.roll(turned, -1)).imag / extent) < 0
     return np.roll(z[::-1], 1) if is_clockwise else z, grid
@@ -107,6 +110,21 @@ def _error_between(z: ComplexArray) -> float:
     at, direction = rate(u[1::2], 0), rate(u[1::2], 1)
     speed = np.maximum(np.abs(direction), np.finfo(float).tiny)  # 0 at cusps
     return float(np.median(np.abs((np.conj(direction) * (z[1::2] - at)).imag / speed)))
+
+
+def _refuse_gap(z: ComplexArray) -> None:
+    """Refuse points of an open curve: one step is far longer than all others, and no side."""
+    step = np.roll(z, -1) - z
+    turn = np.abs(np.angle(step * np.conj(np.roll(step, 1))))
+    k = int(np.argmax(np.abs(step)))
+    times = abs(step[k]) / np.sort(np.abs(step))[-2]
+    after = (k + 1) % len(z)
+    if times > OPEN and max(turn[k], turn[after]) > STRAIGHT:
+        start, end = (f"({one.real:.6g}, {one.imag:.6g})" for one in (z[k], z[after]))
+        raise ValueError(
+            f"points must lie all around the curve, got none on {abs(step[k]):.4g} from {start} to "
+            f"{end}, {times:.3g} times the next largest step: give points there, too"
+        )
 
 
 def _in_plane(xyz: Array, extent: float, grid: float) -> Array:

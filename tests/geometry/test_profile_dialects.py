@@ -290,3 +290,25 @@ def test_size_unlike_the_profile_is_refused(size, why, tmp_path):
     np.savetxt(file, scale * np.column_stack([np.cos(angle), 0.6 * np.sin(angle)]))
     with pytest.raises(ValueError, match=f"size must be .*{why}"):
         read_profile(str(file), None, size)
+
+
+@pytest.mark.parametrize(("share", "times"), [(0.9, "7.02"), (0.5, "63")])
+def test_points_of_an_open_curve_are_refused(share, times):
+    """A spline closed them without a word; the gap is named, from its start to its end."""
+    t = 2.0 * np.pi * share * np.arange(100) / 99
+    points = np.column_stack([np.cos(t), 0.6 * np.sin(t)])
+    words = (
+        rf"^points must lie all around the curve, .* to \(1, 0\), {times} times the next largest"
+    )
+    with pytest.raises(ValueError, match=words):
+        der.profile(points=points)
+
+
+def test_a_straight_side_needs_no_points():
+    """One long step that goes on straight at both ends, and two of them."""
+    t = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 40)
+    right, left = np.exp(1j * t) + 1.0, -np.exp(1j * t) - 1.0
+    side = np.linspace(1.0 + 1.0j, -1.0 + 1.0j, 20)[1:-1]
+    for z in (np.concatenate([right, left]), np.concatenate([right, side, left])):
+        ring = der.profile(points=np.column_stack([z.real, z.imag]))
+        assert ring.length == pytest.approx(0.5 * (2.0 * np.pi + 4.0), rel=0.02)
