@@ -213,7 +213,8 @@ class _Stability:
             if low[1] == high[1] and a.point.stiffness and b.point.stiffness:
                 softest = zip(a.point.stiffness[c], b.point.stiffness[c], strict=True)
                 for part, pair in enumerate(softest):
-                    places += replace(counting, part=part).between_equals(low, high, pair)
+                    if not counting.stiff(pair):
+                        places += replace(counting, part=part).between_equals(low, high, pair)
             ends = pairwise(sorted(places))
             changes = [one for low, high in ends for one in counting.changes(low, high)]
             found += [replace(one, fold=c == 0 and is_fold(self.step, one.s)) for one in changes]

@@ -130,6 +130,8 @@ def _joints(
     if n_cells < len(joints) - 1:
         joints = [begin, end]
     at, jump = _kinks(ring, begin + margin, end - margin)
+    if not len(at):
+        return joints, False
     size = np.abs(jump)
     size[np.isin(at, joints)] = 0.0
     for share in (0.0, STRONG):

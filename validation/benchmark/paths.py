@@ -16,6 +16,7 @@ from der.problem import Point, Statistics
 from der.rod.equilibrium import Equilibrium
 from der.rod.gripped_ring import GrippedRing, gripped_ring
 from validation.benchmark.extent import Extent
+from validation.benchmark.replay import kernel_time
 from validation.benchmark.rings import RINGS, BenchRing, circle
 from validation.benchmark.rows import Row, cpu_time, path_row
 
@@ -27,6 +28,7 @@ PATHS = {
     "h/t 4, N 64, quarter, index at every state": circle(4.0),
     "h/t 1.6, N 64, quarter, index, two folds": circle(1.6),
     "h/t 1, N 64, until folded, index": circle(1.0, until="folded"),
+    "h/t 4, N 128, error bars, index, self-crossings": circle(4.0, n_edges=128, error_bars=True),
     "h/t 4, N 128, quarter, error bars": circle(4.0, n_edges=128, stability=False, error_bars=True),
     "h/t 1.6, N 64, quarter, angle up and down, 2 snaps": circle(1.6, control="angle", unload=True),
     "h/t 4, N 64, quarter, by relaxation alone": circle(4.0, control="angle", solver="relaxation"),
@@ -46,6 +48,7 @@ def rows(extent: Extent) -> Iterator[Row]:
     for case, scene in PATHS.items():
         work = partial(der.fold, scene)
         yield path_row("path", case, work, extent.repeats, GOALS.get(case))
+        yield kernel_row("path", case, work, extent.repeats)
     yield from bvp_paths(extent.repeats, extent.rings)
     few = min(extent.repeats, 5)
     yield from relaxation(extent.relaxed, few)
@@ -59,6 +62,12 @@ def bvp_paths(repeats: int, rings: tuple[BenchRing, ...] = RINGS) -> Iterator[Ro
         for tolerance, goal in ((1e-6, GOALS.get(case.name)), (1e-8, None)):
             work = partial(der.solve_bvp, case.scene(), tolerance=tolerance)
             yield path_row("bvp path", f"{case.name}, {tolerance:.0e}", work, repeats, goal)
+
+
+def kernel_row(group: str, case: str, work: Callable[[], object], repeats: int) -> Row:
+    """The kernels of a path by themselves [ms]."""
+    seconds, calls = kernel_time(work, repeats)
+    return Row(group, f"{case}, kernels", 1e3 * seconds, "ms", note=f"{calls} calls")
 
 
 def relaxation(sizes: tuple[int, ...], repeats: int) -> Iterator[Row]:

@@ -14,12 +14,13 @@ strand is the spline through the vertices between two of these.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse.linalg import SuperLU, splu
 
 from der.analysis.self_crossing import CONTACT
 from der.continuation.step import Step
@@ -59,7 +60,8 @@ def smooth_crossing(
 
     Notes
     -----
-    Newton's method from the middle of the step, with the rate along the path there.
+    Newton's method from the middle of the step; the rate along the path is that between the last
+    two iterates.
     """
     pieces = [_piece(ring.breaks, float(u)) for u in where]
     apart = partial(_apart, ring, step, finest, pieces, degree)
@@ -76,7 +78,8 @@ def smooth_crossing(
         if abs(change[2]) < _CLOSE:
             inside = all(map(partial(_inside, 1.0 / ring.n_edges), pieces, at[:2]))
             return cast(Equilibrium, step.at(float(at[2]))) if inside else None
-        here = apart(at[2])
+        before, here = here, apart(at[2])
+        rate = (_between(before, at) - _between(here, at)) / change[2]
     return None
 
 
@@ -103,7 +106,7 @@ def _apart(
 def _corrected(x: Array, fine: BSpline, degree: int, piece: Piece) -> Curve:
     """A strand of the finest mesh, moved to vertices of another."""
     k, n = _vertices(piece, len(x)), len(x)
-    away = _spline(x[k % n] - fine((k + 0.5) / n), k, n, degree)
+    away = _spline(x[k % n] - fine((k + 0.5) / n), piece, n, degree)
     return lambda u, order=0: fine(u, order) + away(u, order)
 
 
@@ -126,12 +129,22 @@ def _vertices(piece: Piece, n: int) -> NDArray[np.int_]:
 def _through(x: Array, degree: int, piece: Piece) -> BSpline:
     """The curve through the vertices of a part; the ring goes on around."""
     k, n = _vertices(piece, len(x)), len(x)
-    return _spline(x[k % n], k, n, degree)
+    return _spline(x[k % n], piece, n, degree)
 
 
-def _spline(x: Array, k: NDArray[np.int_], n: int, degree: int) -> BSpline:
-    """The spline through vertices ``k`` of ``n``, of lower degree if they are few."""
-    return make_interp_spline((k + 0.5) / n, x, k=min(degree, len(k) - 1))
+@lru_cache(maxsize=64)
+def _interpolation(piece: Piece, n: int, degree: int) -> tuple[Array, int, SuperLU]:
+    """Knots and degree, lower if vertices are few, of a part's splines, and factors for them."""
+    u = (_vertices(piece, n) + 0.5) / n
+    degree = min(degree, len(u) - 1)
+    knots = make_interp_spline(u, u, k=degree).t
+    return knots, degree, splu(BSpline.design_matrix(u, knots, degree).tocsc())
+
+
+def _spline(x: Array, piece: Piece, n: int, degree: int) -> BSpline:
+    """The spline through the vertices ``x`` of a part, of ``n`` of the ring."""
+    knots, degree, factors = _interpolation(piece, n, degree)
+    return BSpline.construct_fast(knots, np.ascontiguousarray(factors.solve(x)), degree)
 
 
 def _between(strands: Sequence[Curve], at: Array) -> Array:
