@@ -106,7 +106,11 @@ class Counting:
         at the ends, two modes change in opposite sense, perhaps close together: the root of the one
         is bisected as long as the difference shrinks, as it does not at a jump.
         """
-        if not halvings or self.stiff(stiffness) or high[0] - low[0] < SAME * self.step.length:
+        if (
+            not halvings
+            or is_stiff(self.system, stiffness)
+            or high[0] - low[0] < SAME * self.step.length
+        ):
             return []
         u = self._reaches(low[0], high[0], stiffness)
         if u is None:
@@ -122,10 +126,6 @@ class Counting:
             if found:
                 return found
         return []
-
-    def stiff(self, stiffness: tuple[float, float]) -> bool:
-        """Whether stiffnesses of one sign at two places are too large to vanish between them."""
-        return stiffness[0] * stiffness[1] > 0.0 and min(map(abs, stiffness)) > self.system.soft
 
     def _reaches(self, low: float, high: float, stiffness: tuple[float, float]) -> float | None:
         """Where between two places, 0 to 1, the tangent at the softer one goes through zero."""
@@ -163,6 +163,12 @@ class Counting:
             *([Change(*folds[0], self.symmetry, rest)] if rest else []),
             *self.changes(near[1], last),
         ]
+
+
+def is_stiff(system: Stability[Any], stiffness: tuple[float, float]) -> bool:
+    """Whether stiffnesses of one sign at two places are too large to vanish between them."""
+    first, last = stiffness
+    return first * last > 0.0 and abs(first) > system.soft and abs(last) > system.soft
 
 
 def _span(ends: tuple[float, float]) -> float:

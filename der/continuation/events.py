@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Generic, NamedTuple, Protocol, cast
 
-from der.continuation.bifurcations import Change, Counting, is_fold, merged, own_changes
+from der.continuation.bifurcations import Change, Counting, is_fold, is_stiff, merged, own_changes
 from der.continuation.extrema import Curve, Found, extrema, of_observable, of_parameter
 from der.continuation.step import SAME, Step
 from der.errors import ContinuationFailed, Reason
@@ -202,19 +202,23 @@ class _Stability:
         """Changes of the index of any class between two marks, with folds ``across`` them."""
         found: list[Change] = []
         for c, symmetry in enumerate(self.system.classes):
-            counting = Counting(self.step, self.system, symmetry)
             low, high = ((m.s, (m.point.index or ())[c]) for m in (a, b))
-            if c == 0 and across:
+            softest: list[tuple[float, float]] = []  # at both ends, of each part of the class
+            if a.point.stiffness and b.point.stiffness:
+                softest = list(zip(a.point.stiffness[c], b.point.stiffness[c], strict=True))
+            beside = c == 0 and bool(across)
+            if not beside and low[1] == high[1] and all(is_stiff(self.system, p) for p in softest):
+                continue
+            counting = Counting(self.step, self.system, symmetry)
+            if beside:
                 folds = [(m.s, m.point.solution) for m in across]
                 if not self._returns(a, b):
                     found += counting.beside_folds((low, a.point.solution), high, folds)
                 continue
             places = [low, high]
-            if low[1] == high[1] and a.point.stiffness and b.point.stiffness:
-                softest = zip(a.point.stiffness[c], b.point.stiffness[c], strict=True)
+            if low[1] == high[1]:
                 for part, pair in enumerate(softest):
-                    if not counting.stiff(pair):
-                        places += replace(counting, part=part).between_equals(low, high, pair)
+                    places += replace(counting, part=part).between_equals(low, high, pair)
             ends = pairwise(sorted(places))
             changes = [one for low, high in ends for one in counting.changes(low, high)]
             found += [replace(one, fold=c == 0 and is_fold(self.step, one.s)) for one in changes]
