@@ -10,6 +10,7 @@ import numpy as np
 
 from der.bvp.corrector import CONVERGED, DIVERGED, SINGULAR, SLOW, correct
 from der.bvp.gauss import Array, Rule, rule
+from der.bvp.march import ERROR, NUMBERS, States, errors
 from der.bvp.meshes import Mesh, first_mesh, moved_to
 from der.bvp.sectors import Sector
 from der.errors import ContinuationFailed, Reason
@@ -156,25 +157,42 @@ class Collocation:
         return self.solved(mesh, Direction(frames, at.p, at.gamma), along)
 
     def error(self, at: Solution) -> Error:
-        """Change of (gamma, M, U) across the path by one iteration on halved intervals.
+        """Change of (gamma, M, U) across the path by one iteration on halved intervals."""
+        fine, t = at.mesh.halved, at.tangent
+        state = at.nodes, at.frames, at.p, t.frames, _numbers(at)
+        return Error(*errors(*self.sector.piece, fine.h, fine.rest, *state))
 
-        The polynomials are accurate to h^(m+1) between the mesh points, so one iteration leaves the
-        square of that: the change is the discretisation error of the coarse solution, h^(2m), to
-        1 part in 2^(2m).
-        """
-        fine = at.mesh.halved
-        n, m = at.mesh.rest.shape
 
-        shape = (2 * n, m, 4)
-        values = np.concatenate([at.nodes[:-1, None], at.frames], axis=1)
-        guess = Direction((self.rule.halves @ values).reshape(shape), at.p, at.gamma)
-        t = at.tangent
-        along = Direction((self.rule.halves_inner @ t.frames).reshape(shape), t.p, t.gamma)
-        found = self.solved(fine, guess, along, iterations=1, tolerance=0.0)
-        if isinstance(found, Failure):
-            return Error(np.inf, np.inf, np.inf)
-        changes = (getattr(found, name) - getattr(at, name) for name in Error._fields)
-        return Error(*map(abs, changes))
+def room(mesh: Mesh, n_p: int, *count: int) -> States:
+    """Room for one state on a mesh, or for as many as asked."""
+    n, m = mesh.rest.shape
+    shapes = ((n, m, 4), (n_p,), (n, m, 4), (n_p,), (n + 1, 4), (n + 1, 3), (NUMBERS,))
+    return States._make(np.empty((*count, *shape)) for shape in shapes)
+
+
+def states_from(at: Solution, count: int) -> States:
+    """Room for states, of which the first is a solution."""
+    states, t = room(at.mesh, len(at.p), count), at.tangent
+    values = (at.frames, at.p, t.frames, t.p, at.nodes, at.places)
+    for part, value in zip(states[:-1], values, strict=True):
+        part[0] = value
+    states.numbers[0, :ERROR] = _numbers(at)
+    return states
+
+
+def _numbers(at: Solution) -> Array:
+    """The numbers of a state."""
+    rates = at.tangent.gamma, at.moment_rate
+    return np.array([at.gamma, at.moment, at.energy, *rates, at.orientation, at.iterations])
+
+
+def solution_of(mesh: Mesh, state: States) -> Solution:
+    """One state as a solution on its mesh."""
+    frames, p, tangent, tangent_p, nodes, places, numbers = state
+    gamma, moment, energy, gamma_rate, rate, sign, done = numbers[:ERROR].tolist()
+    along = Direction(tangent, tangent_p, gamma_rate)
+    rest = (rate, int(sign), nodes, places, int(done))
+    return Solution(mesh, frames, p, gamma, moment, energy, along, *rest)
 
 
 def collocation(sector: Sector) -> Collocation:

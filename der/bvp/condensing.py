@@ -47,10 +47,22 @@ class Inner(NamedTuple):
     bent: Array  # (3, 4 m) change of q' by the tangents of one stage
 
 
+class Work(NamedTuple):
+    """Workspace of Newton's method, with p and gamma as the first n_p + 1 variations."""
+
+    z: Array  # (n, n_p + 2, 4 m) variations at the stages, the residual's last,
+    dq: Array  # (n_p + 2, 4) and of frame
+    dr: Array  # (n_p + 2, 3) and position at the right end of an interval
+    w: Array  # (4 m + n_p + 2, 4 m) columns of one interval
+    inner: Inner
+    target: Array  # (2, 4) frame wanted at the far end, and its derivative by gamma
+    small: Array  # (n_p + 3, n_p + 1) columns of the border
+
+
 @kernel
-def workspace(m):
-    """Workspace for intervals of m stages."""
-    return Inner(
+def workspace(n, m, n_p):
+    """Workspace for up to n intervals of m stages."""
+    inner = Inner(
         np.empty((m, 3)),
         np.empty((m, 3, 3)),
         np.empty((m, 4)),
@@ -60,6 +72,15 @@ def workspace(m):
         np.empty((3, 4 * m)),
         np.empty((m, 3, 4)),
         np.empty((3, 4 * m)),
+    )
+    return Work(
+        np.empty((n, n_p + 2, 4 * m)),
+        np.empty((n_p + 2, 4)),
+        np.empty((n_p + 2, 3)),
+        np.empty((4 * m + n_p + 2, 4 * m)),
+        inner,
+        np.empty((2, 4)),
+        np.empty((n_p + 3, n_p + 1)),
     )
 
 
@@ -253,13 +274,13 @@ def _carry(h, frames, inner, z, node, place, out_node, out_place, out_dq, out_dr
 
 
 @kernel
-def forward(piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target):
+def forward(piece, h, rest, frames, p, gamma, work, nodes, places):
     """Eliminate all intervals, one after the other; returns the determinant's sign, 0 if singular.
 
-    Fills ``nodes``, ``places``, ``z`` (n, n_c, 4 m) (variations at the stages), ``dq`` (n_c, 4) and
-    ``dr`` (n_c, 3) (at the far end), and ``target`` (2, 4): the frame wanted there and its
-    derivative by gamma.
+    Fills ``nodes``, ``places``, and of ``work`` all but ``small``; ``dq`` and ``dr`` are then those
+    at the far end.
     """
+    z, dq, dr, w, inner, target = work.z, work.dq, work.dr, work.w, work.inner, work.target
     m0, force, moment = np.empty(3), np.empty(3), np.empty(3)
     turn, d_start = np.empty((3, 4)), np.empty(4)
     size = w.shape[1]

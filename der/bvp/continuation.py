@@ -1,8 +1,8 @@
 """Follow the path of a boundary-value problem through its folds, by pseudo-arclength (Keller 1977).
 
-Each step is a cubic between two solutions (`step`), on which folds, limits of the moment and
-solutions that were asked for are located (`events`). The mesh follows the solution; its number of
-intervals follows the estimated error.
+A kernel goes ahead by several steps (`ahead`). Each is a cubic between two solutions (`step`), on
+which folds, limits of the moment and solutions that were asked for are located (`events`). The mesh
+follows the solution; its number of intervals follows the estimated error.
 """
 
 from __future__ import annotations
@@ -11,28 +11,22 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from der.bvp.collocation import Collocation, Failure, Solution, required
+from der.bvp.ahead import Ahead
+from der.bvp.collocation import Collocation, Solution, required
 from der.bvp.events import Point, Wanted, located
+from der.bvp.march import SMALLEST_STEP
 from der.bvp.meshes import fitted
 from der.bvp.step import Statistics, Step
 from der.errors import ContinuationFailed, Reason
 
 FIRST_STEP = 0.05
 FIRST_TURN, LEAST_TURN = 0.02, 2e-4  # rad
-LARGEST_STEP = 0.6
-SMALLEST_STEP = 1e-8
-ANGLE = 0.15  # rad, aimed at between tangents of neighbouring states
-SHARPEST = 0.6  # rad, a step that turns more is repeated shorter
-STRAIGHT = 0.01  # bulge of a step that is believed although its ends are oriented unequally
-EASY = 4  # Newton iterations; a step that takes more is followed by a shorter one
 MOST_STEPS = 2000
 MOST_WORK = 200_000  # intervals of all steps together: a ring that winds up needs more and more
 FEWEST_INTERVALS, MOST_INTERVALS = 3, 4000
-REFIT = 16  # steps after which the mesh is fitted again, unless its error asks for it before
 # Four times the intervals leave 2e-5 of an error of order 8. If half of it remains, it is rounding.
 MORE, REMAINS = 4.0, 0.5
 SAFETY = 0.25  # of the tolerance: the error aimed at
-NEGLIGIBLE = 1e-3  # of the tolerance: square of a step's last increment, about the error left
 
 
 class Scales:
@@ -49,18 +43,18 @@ class Scales:
         on too coarse a mesh may have any energy, and one beyond the end may have the largest.
         """
         moment, energy = self._with(points)
-        return max(
-            max(p.error.gamma / math.pi, p.error.moment / moment, p.error.energy / energy)
-            for p in points
-        )
+        return max(max(g / math.pi, m / moment, u / energy) for _, (g, m, u), _ in points)
 
     def take(self, points: Sequence[Point]) -> None:
         """Take note of points that are handed out."""
         self.moment, self.energy = self._with(points)
 
     def _with(self, points: Sequence[Point]) -> tuple[float, float]:
-        moment = max(self.moment, *(abs(point.solution.moment) for point in points))
-        return moment, max(self.energy, *(abs(point.solution.energy) for point in points))
+        moment, energy = self.moment, self.energy
+        for point in points:
+            moment = max(moment, abs(point.solution.moment))
+            energy = max(energy, abs(point.solution.energy))
+        return moment, energy
 
 
 def follow(system: Collocation, wanted: Wanted, statistics: Statistics) -> Iterator[Point]:
@@ -149,11 +143,9 @@ class _Path:
     intervals: int  # asked for last
 
     def __post_init__(self) -> None:
-        self.here = self.start.solution
+        self.ahead = Ahead(self.system, self.start.solution, FIRST_STEP)
         # the moment of a stiff ring is largest long before FIRST_TURN
-        self.scales = Scales(self.here, LEAST_TURN)
-        self.last: Step | None = None  # on the present mesh
-        self.length, self.age = FIRST_STEP, 0
+        self.scales = Scales(self.start.solution, LEAST_TURN)
 
     def steps(self) -> Iterator[Point]:
         """Hand out the points after the first."""
@@ -164,24 +156,27 @@ class _Path:
                 raise ContinuationFailed(
                     f"the path has not ended after {counts.steps} steps", Reason.TOO_MANY_STEPS
                 )
-            counts.intervals += len(self.here.mesh.h)
-            step = self._advanced()
-            if (found := self._searched(step)) is None:
+            counts.intervals += len(self.ahead.here.mesh.h)
+            scale = self.scales.moment, self.scales.energy
+            step, end = self.ahead.step(self.wanted, scale, counts)
+            if (found := self._searched(step, end)) is None:
                 continue
             points, ended, size = found
             counts.steps += 1
             self.scales.take(points)
             yield from points
-            if not ended:
-                self._prepare(step, size)
+            self.refinement.done()
+            self.ahead.move(step.end)
+            if self.ahead.full and not ended:
+                n = self.refinement.refined(len(step.end.mesh.h), size)
+                self._refit(step.end, n, self.ahead.length)
 
-    def _searched(self, step: Step) -> tuple[list[Point], bool, float] | None:
+    def _searched(self, step: Step, end: Point) -> tuple[list[Point], bool, float] | None:
         """The points of a step, whether the path ends there, and the error relative to tolerance.
 
         None where the step is to be repeated, shorter or on a finer mesh.
         """
         tolerance = self.wanted.tolerance
-        end = Point(step.end, self.system.error(step.end))
         size = self.scales.largest([end])
         if size <= tolerance:
             try:
@@ -190,69 +185,25 @@ class _Path:
                 # both ends are solutions, but not of one smooth curve: repeat with a shorter step
                 if step.length < 4.0 * SMALLEST_STEP:
                     raise
-                self.length = 0.25 * step.length
+                self.ahead.repeat(0.25 * step.length)
                 return None
             # where a path ends in its first step, errors are relative to that step's values
             size = self.scales.largest(points if self.statistics.steps else [*points, end])
         if size <= tolerance:
             return points, ended, size
-        n = len(self.here.mesh.h)
-        self.refinement.check(n, size, self.here.gamma)
+        n = len(step.start.mesh.h)
+        self.refinement.check(n, size, step.start.gamma)
         # at least one more than asked for last: joints may round the number down
         more = max(self.intervals + 1, self.refinement.refined(n, size))
-        self._refit(step.end, min(more, self.refinement.most))
-        self.length = step.length
+        self._refit(step.end, min(more, self.refinement.most), step.length)
         return None
 
-    def _prepare(self, step: Step, size: float) -> None:
-        """Choose the length of the next step, and its mesh."""
-        ease = math.sqrt(ANGLE / max(step.angle, 1e-3))
-        if step.end.iterations > EASY:
-            ease = min(ease, 0.7)
-        self.length = min(step.length * min(max(ease, 0.5), 2.0), LARGEST_STEP)
-        self.here, self.last, self.age = step.end, step, self.age + 1
-        self.refinement.done()
-        if self.age >= REFIT:
-            self._refit(self.here, self.refinement.refined(len(self.here.mesh.h), size))
-
-    def _refit(self, fit: Solution, n: int) -> None:
+    def _refit(self, fit: Solution, n: int, length: float) -> None:
         """Continue from the same solution on a mesh of about ``n`` intervals fitted to ``fit``."""
         mesh = fitted(fit.mesh, fit.nodes[:-1], fit.frames, n)
-        found = self.system.on(mesh, self.here)
+        here = self.ahead.here
+        found = self.system.on(mesh, here)
         self.statistics.newton_iterations += found.iterations
-        message = f"no solution on {n} intervals at gamma = {self.here.gamma:.6f}"
-        self.here = required(found, message)
-        self.intervals, self.last, self.age = n, None, 0
-
-    def _advanced(self) -> Step:
-        """One accepted step of at most ``length``, shortened until Newton's method follows.
-
-        What Newton's method leaves is the square of the last increment, times 13 at most
-        (measured); the tangent is that before it.
-        """
-        close = math.sqrt(NEGLIGIBLE * self.wanted.tolerance)
-        start, length, reason = self.here, self.length, Reason.TOO_SHARP
-        while length > SMALLEST_STEP:
-            guess = (
-                start.unknowns.plus(length, start.tangent)
-                if self.last is None
-                else self.last.beyond(length)
-            )
-            end = self.system.solved(
-                start.mesh, guess, start.tangent, iterations=7, tolerance=close
-            )
-            self.statistics.newton_iterations += end.iterations
-            if isinstance(end, Failure):
-                reason = end.reason
-            else:
-                step = Step(self.system, start, end, length, self.statistics)
-                if not step.angle < SHARPEST:
-                    reason = Reason.TOO_SHARP
-                elif start.orientation == end.orientation or step.bulge < STRAIGHT:
-                    return step
-                else:
-                    reason = Reason.OTHER_BRANCH
-            length *= 0.5
-        raise ContinuationFailed(
-            f"no step forward from gamma = {start.gamma:.8f}: {reason.value}", reason
-        )
+        message = f"no solution on {n} intervals at gamma = {here.gamma:.6f}"
+        self.ahead = Ahead(self.system, required(found, message), length)
+        self.intervals = n

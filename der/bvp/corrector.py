@@ -52,11 +52,12 @@ def _vector_part(target, q, out):
 
 
 @kernel
-def border(h, along, along_gamma, z, node, place, dq, dr, target, out):
+def border(h, along, along_gamma, node, place, work):
     """The small system's columns: conditions at the far end, and the row of the tangent.
 
     Columns p, gamma | increment that removes the residual, orthogonal to the tangent | tangent.
     """
+    z, dq, dr, target, out = work.z, work.dq, work.dr, work.target, work.small
     n_p = out.shape[1] - 1
     G, R = n_p, n_p + 1
     n, m = along.shape[:2]
@@ -167,26 +168,32 @@ def correct(
     orientation : sign of the determinant of the complete system, tangent row included.
     moment, energy : M and the sector's U.
     """
-    piece = Piece(quarter, stiffness, start, end, loads)
+    n, m = rest.shape
+    return newton(
+        Piece(quarter, stiffness, start, end, loads), h, rest, frames, p, gamma,
+        along, along_gamma, by_gamma, iterations, tolerance,
+        workspace(n, m, p.size), out_nodes, out_places, out_tangent, out_tangent_p,
+    )  # fmt: skip
+
+
+@kernel
+def newton(
+    piece, h, rest, frames, p, gamma, along, along_gamma, by_gamma, iterations, tolerance,
+    work, out_nodes, out_places, out_tangent, out_tangent_p,
+):  # fmt: skip
+    """`correct`, with a workspace for at least as many intervals."""
     n, m = rest.shape
     n_p = p.size
     G, R = n_p, n_p + 1  # columns: p, gamma, residual
-    z = np.empty((n, n_p + 2, 4 * m))
-    dq, dr = np.empty((n_p + 2, 4)), np.empty((n_p + 2, 3))
-    w = np.empty((4 * m + n_p + 2, 4 * m))
-    inner = workspace(m)
-    target = np.empty((2, 4))
-    small = np.empty((n_p + 3, n_p + 1))
+    small = work.small
     tangent_gamma, rate = 0.0, 0.0
     orientation, status, done = 0, SLOW, 0
 
     while done < iterations:
         done += 1
-        orientation = forward(
-            piece, h, rest, frames, p, gamma, out_nodes, out_places, z, dq, dr, inner, w, target
-        )
+        orientation = forward(piece, h, rest, frames, p, gamma, work, out_nodes, out_places)
         if orientation != 0:
-            border(h, along, along_gamma, z, out_nodes[n], out_places[n], dq, dr, target, small)
+            border(h, along, along_gamma, out_nodes[n], out_places[n], work)
             orientation *= eliminate(small)
         if orientation == 0 or (by_gamma and small[R + 1, G] == 0.0):
             status = SINGULAR
@@ -197,14 +204,14 @@ def correct(
             for c in range(n_p):
                 step[c] -= share * rates[c]
             step[G] = 0.0
-        size, square = move(h, z, step, rates, frames, out_tangent)
+        size, square = move(h, work.z, step, rates, frames, out_tangent)
         unit = 1.0 / np.sqrt(square + rates[G] * rates[G])
         for i in range(n):
             for j in range(m):
                 for a in range(4):
                     out_tangent[i, j, a] *= unit
         tangent_gamma = unit * rates[G]
-        rate = unit * _moment_rate(loads, p, out_places[n], dr, rates)
+        rate = unit * _moment_rate(piece.loads, p, out_places[n], work.dr, rates)
         for c in range(n_p):
             out_tangent_p[c] = unit * rates[c]
             p[c] += step[c]

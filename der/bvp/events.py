@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from der import problem
 from der.bvp.collocation import Error, Solution
+from der.bvp.gauss import Array
 from der.bvp.step import Step
 from der.continuation import events
 
@@ -30,6 +33,11 @@ class Wanted:
     until: Callable[[Solution], bool] | None = None  # end at a state at gamma = pi
     targets: tuple[float, ...] | None = None  # gammas to solve at; None: multiples of pi/8
     tolerance: float = 1e-8  # of gamma/pi, M and U, relative to their largest
+
+    @cached_property
+    def stops(self) -> Array:
+        """Values of gamma where the path may end."""
+        return np.array([-self.gamma_max, self.gamma_max] + [math.pi] * (self.until is not None))
 
     @cached_property
     def events(self) -> events.Events[Solution]:

@@ -21,7 +21,14 @@ from itertools import pairwise
 from typing import Any, Generic, NamedTuple, Protocol, cast
 
 from der.continuation.bifurcations import Change, Counting, is_fold, is_stiff, merged, own_changes
-from der.continuation.extrema import Curve, Found, extrema, of_observable, of_parameter
+from der.continuation.extrema import (
+    Curve,
+    Found,
+    extrema,
+    keeps_sense,
+    of_observable,
+    of_parameter,
+)
 from der.continuation.step import SAME, Step
 from der.errors import ContinuationFailed, Reason
 from der.problem import Indices, Point, S, Solution, Stability, System
@@ -96,6 +103,8 @@ def located(events: Events[Any], step: Curve, here: Point[Any]) -> tuple[list[Po
 
     The index and further events need a `Step`; for the others any curve of solutions will do.
     """
+    if _plain(events, step):
+        return [Point(step.end)], False
     folds = _folds(step)
     marks, ended = _at_targets(events, step, folds)
     if not ended:
@@ -111,6 +120,20 @@ def located(events: Events[Any], step: Curve, here: Point[Any]) -> tuple[list[Po
     if events.stability:  # the index at further events is used, too
         line = _Stability(step.system, events, cast(Step[Any], step)).located(line)
     return [m.point for m in line[1:]], ended
+
+
+def _plain(events: Events[Any], step: Curve) -> bool:
+    """Whether nothing is to be looked for in a step, as its ends tell."""
+    start, end, length = step.start, step.end, step.length
+    return (
+        not (events.stability or events.further)
+        and not events.values_between(start.parameter, end.parameter)
+        and keeps_sense(length, of_parameter(start), (end.parameter, float(step.end_rate[-1])))
+        and all(
+            keeps_sense(length, start.observables[name], end.observables[name])
+            for name in events.limits
+        )
+    )
 
 
 def _folds(step: Curve) -> list[Found]:

@@ -82,12 +82,30 @@ def extrema(
     ----------
     along : the same value and its rate by s, where that differs from the rate along the path.
     """
+    length, ends = high[0] - low[0], ((along or value)(low[1]), (along or value)(high[1]))
+    if not length > 0.0 or keeps_sense(length, *ends):
+        return []
     places = _samples(step, low, high, along or value)
     return [
         _extremum(step, a, b, value)
         for a, b in pairwise(_bisected(step, places, value))
         if a[0] < b[0] and value(a[1])[1] * value(b[1])[1] < 0.0
     ]
+
+
+def keeps_sense(length: float, first: tuple[float, float], last: tuple[float, float]) -> bool:
+    """Whether a value only grows, or falls, as far as it and its rates at two places tell."""
+    (a, rate), (b, other) = first, last
+    if rate * other <= 0.0 or _against(b - a, rate, other, length):
+        return False
+    least = least_rate(*rate_of_cubic((b - a) / length, rate, other))
+    return least is None or math.copysign(1.0, rate) * least[1] >= _ASLANT * abs(rate)
+
+
+def _against(jump: float, rate: float, other: float, length: float) -> bool:
+    """Whether a value changes against its rates of equal signs at both ends of a length."""
+    least = _AGAINST * max(abs(rate), abs(other)) * length
+    return jump * math.copysign(1.0, rate) < -least
 
 
 def _extremum(step: Curve, low: Found, high: Found, value: Value) -> Found:
@@ -150,8 +168,8 @@ def _bisected(step: Curve, places: list[Found], value: Value) -> list[Found]:
         end = high
         while high[0] - low[0] > ROOT:
             (first, rate), (last, other) = value(low[1]), value(high[1])
-            least = _AGAINST * max(abs(rate), abs(other)) * (high[0] - low[0])
-            if rate * other <= 0.0 or (last - first) * math.copysign(1.0, rate) >= -least:
+            length = high[0] - low[0]
+            if rate * other <= 0.0 or not _against(last - first, rate, other, length):
                 break
             s = 0.5 * (low[0] + high[0])
             middle = (s, step.at(s))

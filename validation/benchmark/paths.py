@@ -57,11 +57,13 @@ def rows(extent: Extent) -> Iterator[Row]:
 
 
 def bvp_paths(repeats: int, rings: tuple[BenchRing, ...] = RINGS) -> Iterator[Row]:
-    """The boundary-value problem's paths at 1e-6 and at 1e-8."""
+    """The boundary-value problem's paths at 1e-6 and at 1e-8, and their kernels."""
     for case in rings:
         for tolerance, goal in ((1e-6, GOALS.get(case.name)), (1e-8, None)):
             work = partial(der.solve_bvp, case.scene(), tolerance=tolerance)
-            yield path_row("bvp path", f"{case.name}, {tolerance:.0e}", work, repeats, goal)
+            words = f"{case.name}, {tolerance:.0e}"
+            yield path_row("bvp path", words, work, repeats, goal)
+            yield kernel_row("bvp path", words, work, repeats)
 
 
 def kernel_row(group: str, case: str, work: Callable[[], object], repeats: int) -> Row:

@@ -63,20 +63,15 @@ def _shoot(
     """
     n, m = rest.shape
     n_p = p.size
-    z = np.empty((n, n_p + 2, 4 * m))
-    dq, dr = np.empty((n_p + 2, 4)), np.empty((n_p + 2, 3))
-    w = np.empty((4 * m + n_p + 2, 4 * m))
-    inner = workspace(m)
-    target = np.empty((2, 4))
-    small = np.empty((n_p + 3, n_p + 1))
+    work = workspace(n, m, n_p)
     along = np.zeros_like(frames)
     still = np.zeros(n_p + 1)
     ok = False
     for _ in range(iterations):
-        sign = forward(piece, h, rest, frames, p, gamma, nodes, places, z, dq, dr, inner, w, target)
+        sign = forward(piece, h, rest, frames, p, gamma, work, nodes, places)
         if sign == 0:
             break
-        size, _square = move(h, z, still, still, frames, along)
+        size, _square = move(h, work.z, still, still, frames, along)
         if not size < 2.0:
             break
         if size < tolerance:
@@ -86,11 +81,11 @@ def _shoot(
         for j in range(m):
             for a in range(4):
                 along[i, j, a] = 0.0
-    border(h, along, 1.0, z, nodes[n], places[n], dq, dr, target, small)
+    border(h, along, 1.0, nodes[n], places[n], work)
     for k in range(n_p):
-        out_missed[k] = -small[n_p + 1, k]
+        out_missed[k] = -work.small[n_p + 1, k]
         for c in range(n_p + 1):
-            out_rates[k, c] = small[c, k]
+            out_rates[k, c] = work.small[c, k]
     return ok
 
 
