@@ -10,12 +10,7 @@ used, so that ``import der`` costs nothing.
 """
 
 from importlib import import_module
-from pathlib import Path as _File
 from typing import TYPE_CHECKING, Any
-
-from der.utils.kernel_cache import keep_kernels as _keep_kernels
-
-_keep_kernels(_File(__file__).parent)
 
 if TYPE_CHECKING:
     from der.analysis.compare import compare

@@ -7,9 +7,9 @@ import sys
 import pytest
 
 from der.cli.commands import main
+from der.packs.folders import FOLDER, keep_kernels
 from der.paper import DIAGRAMS, Drawn
 from der.utils.files import write_whole
-from der.utils.kernel_cache import FOLDER, keep_kernels
 
 SMALL = ["fold", "circle", "--h-over-t", "4", "--edges", "16", "--gamma-max", "0.1"]
 

@@ -78,7 +78,7 @@ def fold(
 
     with Run() as run:
         counted = (request.stability, request.self_crossings)
-        run.prepare(lambda: _load_kernels(*counted, snaps=scene.control != "arclength"))
+        run.prepare(lambda: use_kernels(*counted, snaps=scene.control != "arclength"))
         points = run.collect(_points(scene, ring, request, statistics), tell)
         if run.done and points[-1].solution.parameter == -scene.gamma_max:
             run.note(Reason.TURNED_BACK)
@@ -133,7 +133,7 @@ def _points(
 
 
 @cache
-def _load_kernels(stability: bool, self_crossings: bool, *, snaps: bool) -> None:
+def use_kernels(stability: bool, self_crossings: bool, *, snaps: bool) -> None:
     """Load or compile the kernels that a path needs, once in a process."""
     ring = gripped_ring(circle(), section(1.0, 1.0), 8)
     if snaps:

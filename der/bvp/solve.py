@@ -69,7 +69,7 @@ def solve_with_points(
             progress(point.solution.gamma)
 
     with Run() as run:
-        run.prepare(lambda: _load_kernels(followed.system.sector.piece.quarter))
+        run.prepare(lambda: use_kernels(followed.system.sector.piece.quarter))
         wanted = _wanted(followed)
         points += run.collect(follow(followed.system, wanted, followed.statistics), tell)
         if run.done and followed.turned_back:
@@ -107,7 +107,7 @@ def check(scene: object, tolerance: object) -> None:
 
 
 @cache
-def _load_kernels(quarter: bool) -> None:
+def use_kernels(quarter: bool) -> None:
     """Load or compile the kernels, once a process, before the clock starts."""
     scene = Scene(circle(), section(1.0, 1.0), sector="quarter" if quarter else "half")
     system = collocation(sector(scene))

@@ -1,6 +1,7 @@
-"""The decorator of kernels: functions of arrays and numbers that numba compiles.
+"""The decorator of kernels: functions of arrays and numbers, run as machine code.
 
-Numba is imported when the first of them has to be compiled.
+A kernel that Python calls is looked up in the packs, which need no compiler. What they lack, or cannot
+take, numba compiles at the first call and keeps in its own way.
 """
 
 from __future__ import annotations
@@ -8,10 +9,15 @@ from __future__ import annotations
 import functools
 import gc
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+from der.packs.folders import keep_kernels
+
 # kernels never raise: what is divided by zero becomes infinite or NaN, and is tested for
-OPTIONS = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+instead: Callable[..., Any] | None = None  # called with a kernel and its arguments, to watch calls
 
 
 class Kernel:
@@ -20,14 +26,25 @@ class Kernel:
     def __init__(self, py_func: Callable[..., Any]) -> None:
         functools.update_wrapper(self, py_func)
         self.py_func = py_func
+        self.name = f"{py_func.__module__}:{py_func.__name__}"
         self._run: Callable[..., Any] | None = None
 
     def __call__(self, *args: Any) -> Any:
         """Run it on C-contiguous arrays and numbers."""
         run = self._run
         if run is None:
-            run = self._run = self.dispatcher
-        return run(*args)
+            run = self._found()
+        result = run(*args)
+        return self.dispatcher(*args) if result is NotImplemented else result
+
+    def _found(self) -> Callable[..., Any]:
+        """What runs it, from now on."""
+        if instead is not None:
+            return functools.partial(instead, self)
+        from der.packs.load import loaded
+
+        self._run = loaded(self.name) or self.dispatcher
+        return self._run
 
     @functools.cached_property
     def dispatcher(self) -> Any:
@@ -36,7 +53,7 @@ class Kernel:
 
 
 def kernel(py_func: Callable[..., Any]) -> Kernel:
-    """Compile a function at its first call."""
+    """Have a function run as machine code."""
     return Kernel(py_func)
 
 
@@ -46,6 +63,7 @@ def _njit() -> Any:
 
     It makes millions of objects that all live for long: collecting them takes a fifth of the time.
     """
+    keep_kernels(Path(__file__).parent.parent)
     import numba
     from numba.core import event, types
     from numba.extending import typeof_impl
