@@ -81,9 +81,8 @@ def build(group: str, folder: Path) -> None:
     pack, reference = compiled(group, seen)
     expected = []
     for one in seen:
-        if one.name in reference:
-            args = copy.deepcopy(one.args)
-            expected.append((one.name, one.args, bits(reference[one.name](*args), args)))
+        args = copy.deepcopy(one.args)
+        expected.append((one.name, one.args, bits(reference[one.name](*args), args)))
     with tempfile.TemporaryDirectory() as private:
         proof = Path(private, "proof")
         proof.write_bytes(pickle.dumps((group, pack, expected)))
@@ -156,7 +155,7 @@ def compiled(group: str, seen: list[Seen]) -> tuple[Pack, dict[str, Callable[...
     from numba.core import codegen, registry
     from numba.core.compiler_lock import global_compiler_lock
 
-    from der.packs.wrapper import Wrapper, takes
+    from der.packs.wrapper import Wrapper
 
     gc.disable()
     kernels.OPTIONS.pop("cache", None)
@@ -195,7 +194,6 @@ def compiled(group: str, seen: list[Seen]) -> tuple[Pack, dict[str, Callable[...
         module, ir.ArrayType(ir.IntType(8).as_pointer(), 64), f"known.{group}"
     )
     table.initializer = ir.Constant(table.value_type, None)
-    roots = {name: root for name, root in roots.items() if takes(root.fndesc)}
     for name, root in roots.items():
         Wrapper(context, table, known, f"call.{name}").write(root.fndesc)
     with global_compiler_lock:

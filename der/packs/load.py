@@ -186,9 +186,10 @@ def _machine() -> Any:
     home = importlib.util.find_spec("numba")
     if home is None or home.origin is None:
         raise ImportError("numba is missing")
-    runtime = _extension(Path(home.origin).parent / "core" / "runtime", "_nrt_python")
-    for name, address in runtime.c_helpers.items():
-        binding.add_symbol(name if name.startswith("_") else "NRT_" + name, address)
+    for module, prefix in (("core.runtime._nrt_python", "NRT_"), ("_helperlib", "numba_")):
+        helpers = _extension(Path(home.origin).parent, module).c_helpers
+        for name, address in helpers.items():
+            binding.add_symbol(name if name.startswith("_") else prefix + name, address)
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     triple = binding.get_process_triple()
@@ -200,15 +201,16 @@ def _machine() -> Any:
     )
 
 
-def _extension(folder: Path, name: str) -> Any:
-    """An extension module by its place: the package around it is not imported."""
-    if (there := sys.modules.get(f"numba.core.runtime.{name}")) is not None:
+def _extension(numba: Path, name: str) -> Any:
+    """An extension module of numba's by its place: the package around it is not imported."""
+    if (there := sys.modules.get(f"numba.{name}")) is not None:
         return there
+    *folders, short = name.split(".")
     suffixes = importlib.machinery.EXTENSION_SUFFIXES
-    file = next(folder / (name + s) for s in suffixes if (folder / (name + s)).exists())
-    spec = importlib.util.spec_from_file_location(name, file)
+    files = [numba.joinpath(*folders, short + suffix) for suffix in suffixes]
+    spec = importlib.util.spec_from_file_location(short, next(f for f in files if f.exists()))
     if spec is None or spec.loader is None:
-        raise ImportError(f"{file} cannot be loaded")
+        raise ImportError(f"numba's {name} cannot be loaded")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -25,27 +25,6 @@ BYTE_ORDER, NUMBER = 26, 28  # of its dtype
 PLAIN = 0x0001 | 0x0100 | 0x0400  # flags: C-contiguous, aligned, writable
 
 
-def takes(fndesc: Any) -> bool:
-    """Whether a wrapper can be written for a kernel; numba has to call the others."""
-    return all(map(_taken, fndesc.argtypes)) and _returned(fndesc.restype)
-
-
-def _taken(kind: Any) -> bool:
-    """Whether an argument of this type can be taken apart."""
-    if isinstance(kind, types.Array):
-        return bool(kind.layout == "C" and kind.mutable and kind.aligned)
-    if isinstance(kind, types.NamedTuple):
-        return all(map(_taken, kind.types))
-    return kind in (types.float64, types.int64, types.boolean)
-
-
-def _returned(kind: Any) -> bool:
-    """Whether a result of this type can be handed back."""
-    if isinstance(kind, types.BaseTuple) and not isinstance(kind, types.BaseNamedTuple):
-        return all(map(_returned, kind.types))
-    return types.unliteral(kind) in (types.float64, types.int64, types.boolean, types.none)
-
-
 def name_of(one: type) -> str:
     """Where a class is found."""
     return f"{one.__module__}:{one.__qualname__}"
@@ -133,6 +112,8 @@ class Wrapper:
             return value
         if isinstance(kind, types.Array):
             return self._array(one, its_type, kind)
+        if not isinstance(kind, types.NamedTuple):
+            raise NotImplementedError(f"an argument of type {kind}")
         self._need(self._is(its_type, name_of(kind.instance_class)))
         self._need(b.icmp_signed("==", self._at(one, SIZE, I64), I64(len(kind))))
         items = [self._at(one, ITEMS + 8 * i, OBJECT) for i in range(len(kind))]
@@ -141,6 +122,8 @@ class Wrapper:
 
     def _array(self, one: Any, its_type: Any, kind: Any) -> Any:
         """An array, borrowed."""
+        if kind.layout != "C" or not (kind.mutable and kind.aligned):
+            raise NotImplementedError(f"an argument of type {kind}")
         b, dtype = self.builder, self._at(one, DTYPE, OBJECT)
         native = np.dtype(str(kind.dtype))
         self._need(self._is(its_type, "numpy:ndarray"))
@@ -173,8 +156,10 @@ class Wrapper:
             return self._python("PyLong_FromLongLong", OBJECT, value)
         if kind == types.none:
             return self._kept("builtins:None")
+        if not isinstance(kind, types.Tuple | types.UniTuple):
+            raise NotImplementedError(f"a result of type {kind}")
         result = self._python("PyTuple_New", OBJECT, I64(len(kind)))
-        for i, one in enumerate(kind.types):
+        for i, one in enumerate(kind):
             item = self._object(self.builder.extract_value(value, i), one)
             self._python("PyTuple_SetItem", I32, result, I64(i), item)
         return result
