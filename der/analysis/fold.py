@@ -143,6 +143,10 @@ def use_kernels(stability: bool, self_crossings: bool, *, snaps: bool) -> None:
     request = Request(gamma_max=0.1, stability=stability, self_crossings=self_crossings)
     for _ in request.follow(ring):
         pass
+    if stability:
+        from der.rod.free_ring import released
+
+        released(ring, gripped_ring(circle(), section(1.0, 1.0), 8, name="full"), ring.start)
     if self_crossings:
         x = ring.vertices(ring.start)
         gap(x, *nearest_strands(x, x))

@@ -1,10 +1,10 @@
 """Make packs of kernels: ``python -m der.packs.build --to FOLDER GROUP ...``.
 
-Small rings are computed with kernels run by Python itself, which shows what kernels Python calls, with
-arguments of which types. Numba compiles these; what they call is linked in before LLVM sees it, so
-that it is optimised once. The pack has to prove itself: another process runs the calls that were
-seen, and its results must be equal, bit by bit, to those of numba's own code for the same kernels,
-not optimised and called in numba's way.
+Small rings are computed with kernels run by Python itself, which shows what kernels Python calls,
+with arguments of which types. Numba compiles these; what they call is linked in before LLVM sees
+it, so that it is optimised once. The pack has to prove itself: another process runs the calls that
+were seen, and its results must be equal, bit by bit, to those of numba's own code for the same
+kernels, not optimised and called in numba's way.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -66,13 +67,18 @@ class Seen(NamedTuple):
 
 
 def main(words: list[str]) -> None:
-    """Build the packs that are named; code 1 if one could not be built."""
+    """Build the packs that are named; an empty one where that fails, so that it is tried once."""
     folder, groups = Path(words[1]), words[2:]
     for group in groups:
         with closing(sqlite3.connect(folder / f"{group}.lock", timeout=600.0)) as lock:
             lock.execute("BEGIN EXCLUSIVE")  # ends with this process at the latest
-            if fresh(folder, group) is None:
+            if fresh(folder, group) is not None:
+                continue
+            try:
                 build(group, folder)
+            except Exception:  # of numba's, of the proof: numba goes on alone, until sources change
+                traceback.print_exc()
+                write(folder / file_name(group), Pack(sources(), [], [], b""))
 
 
 def build(group: str, folder: Path) -> None:
@@ -147,7 +153,7 @@ def plain(value: Any) -> Any:
 
 
 def compiled(group: str, seen: list[Seen]) -> tuple[Pack, dict[str, Callable[..., Any]]]:
-    """The pack, and the same kernels as numba calls them, neither optimised nor in the pack's way."""
+    """The pack, and the same kernels as numba itself calls them, not optimised."""
     import gc
 
     import numba
@@ -163,7 +169,7 @@ def compiled(group: str, seen: list[Seen]) -> tuple[Pack, dict[str, Callable[...
     generator = context.codegen()
     executable = type(context).get_executable
 
-    class Linked(codegen.JITCodeLibrary):  # type: ignore[misc]
+    class Linked(codegen.JITCodeLibrary):  #
         """Code that is optimised and made executable where it is linked to, not here."""
 
         def finalize(self) -> None:
@@ -251,7 +257,7 @@ def sources() -> dict[str, str]:
 def constants_from(module: ModuleType, text: str) -> list[str]:
     """The modules of this package from which a module imports what is no function or class."""
     return [
-        node.module
+        str(node.module)
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "der"
         for one in node.names
@@ -279,16 +285,17 @@ def build_missing(wanted: str) -> Pack:
     process = _building[wanted]
     while process.poll() is None and not (folder / file_name(wanted)).exists():
         time.sleep(0.02)
-    pack = fresh(folder, wanted) or (process.wait() == 0 and fresh(folder, wanted))
-    if not pack:
-        raise RuntimeError(f"kernels {wanted!r} could not be compiled ahead")
+    pack = fresh(folder, wanted)
+    if pack is None or not pack.entries:
+        raise RuntimeError(f"the kernels {wanted!r} could not be compiled ahead")
     return pack
 
 
 def build_all(folder: Path) -> bool:
     """Build all packs into a folder; whether that could be done."""
-    processes = set(start(folder, list(GROUPS), first="rod").values())
-    return not any([process.wait() for process in processes])
+    for process in start(folder, list(GROUPS), first="rod").values():
+        process.wait()
+    return all((pack := fresh(folder, group)) and pack.entries for group in GROUPS)
 
 
 def start(folder: Path, groups: list[str], *, first: str) -> dict[str, subprocess.Popen[bytes]]:

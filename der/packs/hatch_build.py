@@ -1,4 +1,4 @@
-"""Hatchling's hook: packs of kernels go into the wheel, so that the first command need not compile."""
+"""Hatchling's hook: packs of kernels go into the wheel, the first command need not compile."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
-class Packs(BuildHookInterface):
-    """Build packs for the processors of this machine's family, if the wheel is not an editable one."""
+class Packs(BuildHookInterface):  # type: ignore[misc]
+    """Builds packs for the processors of this machine's family, if the wheel is no editable one."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Build them beside the sources; a wheel without packs works, too."""

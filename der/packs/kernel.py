@@ -1,13 +1,12 @@
 """The decorator of kernels: functions of arrays and numbers, run as machine code.
 
-A kernel that Python calls is looked up in the packs, which need no compiler. What they lack, or cannot
-take, numba compiles at the first call and keeps in its own way.
+A kernel that Python calls is looked up in the packs, which need no compiler. What they lack, or
+cannot take, numba compiles at the first call and keeps in its own way.
 """
 
 from __future__ import annotations
 
 import functools
-import gc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -59,32 +58,14 @@ def kernel(py_func: Callable[..., Any]) -> Kernel:
 
 @functools.cache
 def _njit() -> Any:
-    """Numba's decorator; numba is told what kernels are, and not to be slowed down by rubbish.
-
-    It makes millions of objects that all live for long: collecting them takes a fifth of the time.
-    """
+    """Numba's decorator; numba is told what kernels are."""
     keep_kernels(Path(__file__).parent.parent)
     import numba
-    from numba.core import event, types
+    from numba.core import types
     from numba.extending import typeof_impl
 
     @typeof_impl.register(Kernel)
     def _(value: Kernel, context: Any) -> Any:
         return types.Dispatcher(value.dispatcher)
 
-    class Uncollected(event.Listener):
-        depth, was_on = 0, False
-
-        def on_start(self, event: Any) -> None:
-            if self.depth == 0:
-                self.was_on = gc.isenabled()
-                gc.disable()
-            self.depth += 1
-
-        def on_end(self, event: Any) -> None:
-            self.depth -= 1
-            if self.depth == 0 and self.was_on:
-                gc.enable()
-
-    event.register("numba:compile", Uncollected())
     return numba.njit

@@ -157,7 +157,9 @@ _FASTCALL = 0x80  # METH_FASTCALL: arguments as an array
 
 
 def linked(group: str, pack: Pack) -> dict[str, Callable[..., Any]]:
-    """The functions of a pack, ready to be called."""
+    """The functions of a pack, ready to be called; an empty one leaves all to numba."""
+    if not pack.entries:
+        return {}
     from llvmlite import binding
 
     engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())

@@ -1,10 +1,10 @@
 """What Python calls in a pack: LLVM code that takes arguments apart and hands them to a kernel.
 
 Machine code does not ask what it is given, so each argument is checked first: its class, and of an
-array the axes, type, byte order, and that it is contiguous, aligned and writable. What does not fit,
-and a kernel that fails for want of memory, is answered by NotImplemented, and left to numba. Offsets
-are those of public structures of CPython and NumPy: float, tuple, ndarray and its dtype. Arrays are
-borrowed: the caller's argument keeps them alive.
+array the axes, type, byte order, and that it is contiguous, aligned and writable. What does not
+fit, and a kernel that fails for want of memory, is answered by NotImplemented, and left to numba.
+Offsets are those of public structures of CPython and NumPy: float, tuple, ndarray and its dtype.
+Arrays are borrowed: the caller's arguments keep them alive.
 """
 
 from __future__ import annotations
