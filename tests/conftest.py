@@ -10,6 +10,15 @@ import pytest
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Have kernels compiled once, before the workers start."""
+    if not hasattr(config, "workerinput"):
+        from der.packs.load import GROUPS, loaded
+
+        for modules in GROUPS.values():
+            loaded(f"{modules[0]}:")
+
+
 @pytest.fixture(autouse=True, scope="session")
 def ctrl_c_is_heard():
     """Ctrl-C works as in a terminal, also where the tests run in the background of a shell.
