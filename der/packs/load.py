@@ -84,7 +84,8 @@ def usable() -> bool:
     """Whether packs are wanted, and objects of Python look as wrappers expect."""
     shared_lock = getattr(sys, "_is_gil_enabled", lambda: True)()
     usual = platform.python_implementation() == "CPython" and sys.maxsize > 2**32 and shared_lock
-    return usual and os.environ.get("DER_PACKS") != "off"
+    read_as_python = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+    return usual and os.environ.get("DER_PACKS") != "off" and not read_as_python
 
 
 def _found(group: str) -> Pack:
