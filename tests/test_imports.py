@@ -13,7 +13,12 @@ import pytest
 import der
 
 CLONE = Path(__file__).parent.parent
-MODULES = [m.name for m in pkgutil.walk_packages(der.__path__, "der.") if "__main__" not in m.name]
+NOT_IMPORTED = ("__main__", "hatch_build")  # a command, and what only a build imports
+MODULES = [
+    one.name
+    for one in pkgutil.walk_packages(der.__path__, "der.")
+    if one.name.split(".")[-1] not in NOT_IMPORTED
+]
 
 
 def loaded(code, *names):
