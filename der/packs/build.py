@@ -279,7 +279,7 @@ def build_missing(wanted: str) -> Pack:
     places = folders()
     folder = kept_folder(places, "DER_PACKS")
     if wanted not in _building:
-        say("compiling kernels, once: about fifteen seconds on two cores")
+        say("compiling kernels, once: about half a minute on two cores")
         missing = [group for group in GROUPS if not any(fresh(place, group) for place in places)]
         _building.update(start(folder, missing, first=wanted))
     process = _building[wanted]

@@ -29,9 +29,9 @@ from der.packs.folders import say, user_folder
 
 # which kernels are built together: those that call the same ones; the first that fits
 GROUPS = {
-    "motion": ("der.rod.relaxation", "der.rod.dynamics", "der.rod.implicit_step"),
-    "bvp": ("der.bvp", "der.diagram"),
     "path": ("der.continuation", "der.kernels.linking", "der.kernels.strands", "der.rod.manifold"),
+    "bvp": ("der.bvp", "der.diagram"),
+    "motion": ("der.rod.relaxation", "der.rod.dynamics", "der.rod.implicit_step"),
     "rod": ("der",),
 }
 PACKAGE = Path(__file__).resolve().parent.parent
