@@ -68,7 +68,7 @@ def functions(source: str, place: str) -> Iterator[Function]:
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.FunctionDef):
             lines = (node.end_lineno or 0) - node.lineno + 1 - len(_docstring(node))
-            kernel = any("jit" in ast.unparse(one) for one in node.decorator_list)
+            kernel = any("kernel" in ast.unparse(one) for one in node.decorator_list)
             yield Function(f"{place}:{node.lineno} {node.name}", lines, kernel)
 
 

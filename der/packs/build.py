@@ -21,17 +21,16 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from der.packs import kernel as kernels
 from der.packs.folders import kept_folder, say
-from der.packs.kernel import Kernel
+from der.packs.kernel import Kernel, Seen
 from der.packs.load import (
     GROUPS,
     PACKAGE,
@@ -59,13 +58,6 @@ CALLS = 4  # of each kernel, kept for the proof
 PROCESSOR = {"x86_64": "x86-64-v2", "AMD64": "x86-64-v2"}
 
 
-class Seen(NamedTuple):
-    """A call of a kernel."""
-
-    name: str
-    args: tuple[Any, ...]
-
-
 def main(words: list[str]) -> None:
     """Build the packs that are named; an empty one where that fails, so that it is tried once."""
     folder, groups = Path(words[1]), words[2:]
@@ -83,8 +75,11 @@ def main(words: list[str]) -> None:
 
 def build(group: str, folder: Path) -> None:
     """Compile a pack, and put it in place if it proves itself."""
+    from der.packs.compile import compiled  # numba; who waits or compares needs none
+
     seen = calls(group)
-    pack, reference = compiled(group, seen)
+    known, code, reference = compiled(group, seen)
+    pack = Pack(sources(), known, list(reference), code)
     expected = []
     for one in seen:
         args = copy.deepcopy(one.args)
@@ -149,86 +144,7 @@ def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-# --- Compilation -------------------------------------------------------------------------------
-
-
-def compiled(group: str, seen: list[Seen]) -> tuple[Pack, dict[str, Callable[..., Any]]]:
-    """The pack, and the same kernels as numba itself calls them, not optimised."""
-    import gc
-
-    import numba
-    from llvmlite import ir
-    from numba.core import codegen, registry
-    from numba.core.compiler_lock import global_compiler_lock
-
-    from der.packs.wrapper import Wrapper
-
-    gc.disable()
-    kernels.OPTIONS.pop("cache", None)
-    context = registry.cpu_target.target_context
-    generator = context.codegen()
-    executable = type(context).get_executable
-
-    class Linked(codegen.JITCodeLibrary):  #
-        """Code that is optimised and made executable where it is linked to, not here."""
-
-        def finalize(self) -> None:
-            self._raise_if_finalized()
-            for library in dict.fromkeys(self._linking_libraries):
-                self._reload_init.update(library._reload_init)
-                self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-            self._finalize_dynamic_globals()
-            self._finalized = True
-
-    generator._library_class = Linked
-    type(context).get_executable = lambda *args: [].append  # has no address yet
-    roots = {}
-    try:
-        for one in seen:
-            if one.name not in roots:
-                dispatcher = named(one.name).dispatcher
-                signature = tuple(map(numba.typeof, one.args))
-                dispatcher.compile(signature)
-                roots[one.name] = dispatcher.overloads[signature]
-    finally:
-        del generator._library_class
-        type(context).get_executable = executable
-
-    known: list[str] = []
-    module = ir.Module(f"wrappers.{group}")
-    table = ir.GlobalVariable(
-        module, ir.ArrayType(ir.IntType(8).as_pointer(), 64), f"known.{group}"
-    )
-    table.initializer = ir.Constant(table.value_type, None)
-    for name, root in roots.items():
-        Wrapper(context, table, known, f"call.{name}").write(root.fndesc)
-    with global_compiler_lock:
-        whole, plainly = (codegen.JITCodeLibrary(generator, name) for name in ("pack", "reference"))
-        for root in roots.values():
-            root.library._ensure_finalized()
-            for library in (whole, plainly):
-                library._final_module.link_in(root.library._final_module.clone())
-        plainly._finalize_final_module()
-        whole.add_ir_module(module)
-        for function in whole._final_module.functions:
-            if not (function.is_declaration or function.name.startswith("call.")):
-                function.linkage = "internal"  # what is not called goes, numba's wrappers too
-        whole._optimize_final_module()
-        code = generator._tm.emit_object(whole._final_module)
-    reference = {
-        name: executable(context, plainly, root.fndesc, root.environment)
-        for name, root in roots.items()
-    }
-    return Pack(sources(), known, list(roots), code), reference
-
-
-def named(name: str) -> Kernel:
-    """A kernel by "module:function"."""
-    module, function = name.split(":")
-    kernel = getattr(importlib.import_module(module), function)
-    if not isinstance(kernel, Kernel):
-        raise TypeError(f"{name} is not a kernel")
-    return kernel
+# --- What kernels are made from --------------------------------------------------------------
 
 
 def sources() -> dict[str, str]:

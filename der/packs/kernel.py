@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from der.packs.folders import keep_kernels
 
@@ -17,6 +17,13 @@ from der.packs.folders import keep_kernels
 OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 instead: Callable[..., Any] | None = None  # called with a kernel and its arguments, to watch calls
+
+
+class Seen(NamedTuple):
+    """A call of a kernel by Python."""
+
+    name: str
+    args: tuple[Any, ...]
 
 
 class Kernel:
