@@ -44,14 +44,15 @@ from der.packs.load import (
     write,
 )  # fmt: skip
 
-# what calls kernels on small rings, by group
-FOLD = ("der.analysis.fold:use_kernels", {"stability": True, "self_crossings": True})
-BVP = ("der.bvp.solve:use_kernels", {"quarter": True})
+_FOLD = "der.analysis.fold:use_kernels"
+_PATH = {"stability": True, "self_crossings": True, "snaps": False}
+# what calls the kernels of a group on small rings
 USES: dict[str, tuple[str, dict[str, bool]]] = {
-    "rod": (FOLD[0], FOLD[1] | {"snaps": False}),
-    "path": (FOLD[0], FOLD[1] | {"snaps": False}),
-    "bvp": BVP,
-    "motion": (FOLD[0], FOLD[1] | {"snaps": True}),
+    "path": (_FOLD, _PATH),
+    "bvp": ("der.bvp.solve:use_kernels", {"quarter": True}),
+    "motion": (_FOLD, _PATH | {"snaps": True}),
+    "planar": ("der.analysis.planar.planar_states:use_kernels", {}),
+    "rod": (_FOLD, _PATH),
 }
 CALLS = 4  # of each kernel, kept for the proof
 # code for any processor of a family is as fast here as code for one of them

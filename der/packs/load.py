@@ -32,6 +32,7 @@ GROUPS = {
     "path": ("der.continuation", "der.kernels.linking", "der.kernels.strands", "der.rod.manifold"),
     "bvp": ("der.bvp", "der.diagram"),
     "motion": ("der.rod.relaxation", "der.rod.dynamics", "der.rod.implicit_step"),
+    "planar": ("der.kernels.planar",),
     "rod": ("der",),
 }
 PACKAGE = Path(__file__).resolve().parent.parent

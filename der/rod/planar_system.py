@@ -82,7 +82,9 @@ class PlanarRodSystem:
         rod = self._rod_at(load) if hold == PARAMETER else self.rod
         along = self.increment(load=1.0) if along is None else along
         row = (self._weight * along)[:n, None]
-        pin = np.zeros((n, 1, 0)) if self.pin is None else self.pin[:, None, None]
+        pin = np.zeros((n, 1, 0))
+        if self.pin is not None:
+            pin = np.ascontiguousarray(self.pin[:, None, None])
         phi, force = guess.phi.copy(), guess.force.copy()
         x, y = np.empty((n, 1, 1)), np.empty((len(force) + pin.shape[2], 1))
         outcome, taken, residual, load, energy, moment, rate, moment_rate, negative, bent = (

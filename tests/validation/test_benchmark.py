@@ -152,9 +152,10 @@ def test_front_holds_what_none_beats():
 
 
 def test_start_up_measures_whole_commands():
-    """One row each for help and for a fold, in seconds of wall time."""
+    """One row each for help, for a fold, and for the other solver, in seconds of wall time."""
     rows = list(start.compiled(1))
-    assert [row.case for row in rows] == ["der --help", "der fold circle --h-over-t 4 --quiet"]
+    asked = "circle --h-over-t 4 --quiet"
+    assert [row.case for row in rows] == ["der --help", f"der fold {asked}", f"der bvp {asked}"]
     assert all(row.value > 0.0 for row in rows)
 
 

@@ -24,6 +24,8 @@ from der.continuation.arclength import follow
 from der.continuation.events import Events
 from der.continuation.richardson import limit
 from der.errors import ContinuationFailed, Reason
+from der.geometry.section import section
+from der.geometry.shapes import circle
 from der.kernels.planar import Array
 from der.problem import Options
 from der.records.planar import FOLDED, PlanarState, PlanarStates
@@ -263,6 +265,13 @@ def _index(mesh: PlanarRing, one: Found) -> tuple[int | None, int]:
     if up < 0 or down < 0:
         return None, 0
     return up - len(at.force), down - up
+
+
+def use_kernels() -> None:
+    """Call the kernels of a rod in its plane, on a small ring."""
+    mesh = planar_ring(Scene(circle(), section(1.0, 1.0), n_edges=8))
+    for one in states_of_turning(mesh, 1, 1e-10):
+        _index(mesh, one)
 
 
 def _distinct(rows: list[PlanarState]) -> tuple[list[PlanarState], list[int]]:
