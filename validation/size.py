@@ -68,7 +68,8 @@ def functions(source: str, place: str) -> Iterator[Function]:
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.FunctionDef):
             lines = (node.end_lineno or 0) - node.lineno + 1 - len(_docstring(node))
-            kernel = any("kernel" in ast.unparse(one) for one in node.decorator_list)
+            marks = [ast.unparse(one) for one in node.decorator_list]
+            kernel = any("kernel" in one or "jit" in one for one in marks)
             yield Function(f"{place}:{node.lineno} {node.name}", lines, kernel)
 
 

@@ -21,7 +21,7 @@ def area(
     text = """a text
 that is no docstring"""
 
-    @njit(cache=True)
+    @kernel
     def kernel(): return 0
 
     return math.pi * r**2, text
