@@ -42,7 +42,7 @@ from der.packs.load import (
     linked,
     read,
     write,
-)  # fmt: skip
+)
 
 _FOLD = "der.analysis.fold:use_kernels"
 _PATH = {"stability": True, "self_crossings": True, "snaps": False}
@@ -71,7 +71,7 @@ def main(words: list[str]) -> None:
                 build(group, folder)
             except Exception:  # of numba's, of the proof: numba goes on alone, until sources change
                 traceback.print_exc()
-                write(folder / file_name(group), Pack(sources(), [], [], b""))
+                write(folder / file_name(group), Pack(everything(), [], [], b""))
 
 
 def build(group: str, folder: Path) -> None:
@@ -171,6 +171,14 @@ def sources() -> dict[str, str]:
     return found
 
 
+def everything() -> dict[str, str]:
+    """Hashes of all modules of this package that are loaded: any of them may have failed."""
+    names = [name for name in sys.modules if name.split(".")[0] == "der"]
+    files = [Path(str(sys.modules[name].__file__)) for name in names]
+    places = [file.relative_to(PACKAGE).as_posix() for file in files]
+    return {place: digest(place) for place in [*places, "packs/build.py"]}
+
+
 def constants_from(module: ModuleType, text: str) -> list[str]:
     """The modules of this package from which a module imports what is no function or class."""
     return [
@@ -200,9 +208,9 @@ def build_missing(wanted: str) -> Pack:
         missing = [group for group in GROUPS if not any(fresh(place, group) for place in places)]
         _building.update(start(folder, missing, first=wanted))
     process = _building[wanted]
-    while process.poll() is None and not (folder / file_name(wanted)).exists():
-        time.sleep(0.02)
-    pack = fresh(folder, wanted)
+    while (pack := fresh(folder, wanted)) is None and process.poll() is None:
+        time.sleep(0.05)
+    pack = pack or fresh(folder, wanted)  # it may have ended in between
     if pack is None or not pack.entries:
         raise RuntimeError(f"the kernels {wanted!r} could not be compiled ahead")
     return pack

@@ -126,6 +126,30 @@ def test_packs_know_the_modules_of_kernels_and_of_their_constants():
     assert "errors.py" in pack_of("rod").sources  # REASONS, a constant
 
 
+def test_a_pack_of_old_sources_is_waited_for_until_it_is_new(tmp_path, monkeypatch):
+    """A file that is there already is no reason to give up."""
+    new = pack_of("path")
+    file = tmp_path / load.file_name("path")
+    load.write(file, new._replace(sources=new.sources | {"kernels/linking.py": "0"}))
+
+    class Builder:
+        asked = 0
+
+        def poll(self):
+            self.asked += 1
+            if self.asked == 2:
+                load.write(file, new)
+
+    monkeypatch.setenv("DER_PACKS", str(tmp_path))
+    monkeypatch.setattr(build, "_building", {"path": Builder()})
+    assert build.build_missing("path") == new
+
+
+def test_a_failure_is_believed_until_any_module_changes():
+    """Its empty pack names the modules that are loaded, the builder among them."""
+    assert {"packs/build.py", "packs/load.py", "kernels/quaternions.py"} <= set(build.everything())
+
+
 def test_a_pack_that_gives_other_results_is_not_believed(tmp_path):
     """One bit is enough."""
     pack, args = pack_of("path"), (WEIGHT, X, X)
